@@ -115,9 +115,10 @@ def _rated_current(d: Design, currents: limits.Currents) -> list[str]:
     gain = remedies.widen_range(d.board, m.rated_current_a) if wider else ""
     possible = (gain or not wider) and remedies.format_holds(m, d.board, m.rated_current_a)
     torque_nm = limits.digits_down(max(shaft_nm(m, most), 1e-4), 3)
-    torque = f" and [rating] torque to {torque_nm:g} N m" if torque_nm < m.rated_torque_nm else ""
-    return [warning(f"rated current {m.rated_current_a:.3g} A peak is above MAXIMUM_CURRENT_A = {most:g}: at most "
-                    f"{m.kt_nm_per_a * most:.3g} N m of {m.rated_torque_nm:.3g} N m", " and ".join(filter(None, [gain, *raised])) if possible else "",
+    less = torque_nm < m.rated_torque_nm
+    torque = f" and [rating] torque to {torque_nm:g} N m" if less else ""
+    costs = f": at most {m.kt_nm_per_a * most:.3g} N m of {m.rated_torque_nm:.3g} N m" if less else ""
+    return [warning(f"rated current {m.rated_current_a:.3g} A peak is above MAXIMUM_CURRENT_A = {most:g}{costs}", " and ".join(filter(None, [gain, *raised])) if possible else "",
                     f"lower [rating] current to {limits.digits_down(most, 3):g} A peak{torque}")]
 
 

@@ -92,7 +92,8 @@ WARNED = {
     "rated current beyond the motor's own maximum": ({"rated_current_a": 2.8, "maximum_current_a": 2.7},
                                                      ("rated current 2.8 A peak is above MAXIMUM_CURRENT_A = 2.7", "; raise [rating] maximum_current to 2.8 A peak, or lower")),
     "rated current beyond the firmware's range": (
-        {"changes": (*OTHER[1:], HEAVIER, ("value = 1.53", "value = 22"), ("value = 2.75", "value = 24")), "board": {"current_full_scale_a": 60.0}},
+        {"changes": (*OTHER[1:], HEAVIER, ("value = 1.53", "value = 22"), ("value = 2.75", "value = 24")), "rated_torque_nm": 1.31,
+         "board": {"current_full_scale_a": 60.0}},
         ("rated current 22 A peak is above MAXIMUM_CURRENT_A = 20", "N m; lower [rating] current to 20 A peak and [rating] torque to")),
     "kphi that is a factor of 1.4 too small": ({"changes": (("value = 7.24", "value = 5.12"),)},
                                                ("kphi and the rated current give 0.057 N m", "peak and RMS confused?", "kphi to 6.")),
