@@ -144,7 +144,10 @@ def test_a_result_that_is_missing_is_one_line_with_its_command(result):
 def test_the_speed_of_the_board_is_no_figure_of_one_machine(result, tmp_path, cpu_s, cell):
     (tmp_path / "build/run/demo").mkdir(parents=True)
     (tmp_path / "build/run/demo/summary.json").write_text(json.dumps({"motor_seconds": 30.0, "cpu_seconds": cpu_s}))
-    assert figures.real_time() == cell
+    assert figures.real_time(lambda: {"motor_seconds": 30.0, "cpu_seconds": 2.5}) == cell
+    slow = {"motor_seconds": 30.0, "cpu_seconds": 2.5}
+    runs = iter([slow, slow, {"motor_seconds": 30.0, "cpu_seconds": 1.4}])
+    assert figures.real_time(lambda: next(runs)) == "at least 20 times" # the best of a few counts
 
 
 # ---- which firmware ------------------------------------------------------------------------------------------------------
