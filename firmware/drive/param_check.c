@@ -8,6 +8,7 @@
 #endif
 
 #pragma GCC diagnostic ignored "-Woverflow" /* what a value out of range does to the formulas of the relations */
+#pragma GCC diagnostic ignored "-Wdiv-by-zero" /* IS_CONSTANT tells of it, by name */
 
 /* The motor's own 1/Kphi in a table: its relation says once if it does not fit. */
 #define FOLLOWS_KPHI(name) (__builtin_strcmp(PARAM_TEXT(name), PARAM_TEXT(NORM_INVKFIBASE)) == 0)
@@ -38,7 +39,7 @@ PARAM_TABLE(CHECK_RANGE)
 
 /* One wrong value breaks several relations: they are asked only when each value alone is right, and the first of a group that fails ends it. */
 #define RANGE_HOLDS(name, unit, min, max, value, meaning) \
-    &&IN_RANGE(name, min, max) && (!PARAM_COUNTED(unit) || IS_WHOLE(name))
+    &&IS_CONSTANT(name) && IN_RANGE(name, min, max) && (!PARAM_COUNTED(unit) || IS_WHOLE(name))
 #define RANGES_HOLD (1 PARAM_TABLE(RANGE_HOLDS))
 #define HOLDS(condition, message) &&(condition)
 #define CHECK_RELATION(condition, message) CHECK_RELATION_N(__COUNTER__, condition, message)

@@ -323,7 +323,7 @@ LEGAL = {
         "((2.0) + (0.67))", "2*1.335", "1.0*5/2", "6/2", "5/2.", "0.267e1", "00.5", "(0 + 2.67)")},
     "a whole quotient of counts": value("SNAPDELAY", "10/2"),
     "gains of two signs, on purpose": value("KCURRB", "0.5") + "#define KCURR_SIGNS_DIFFER\n",
-    "a share of 1/Kphi": value("INVKFI_SPEED3", "(NORM_INVKFIBASE * 11 / 10)"),
+    "a share of 1/Kphi": value("INVKFI_SPEED3", "(NORM_INVKFIBASE * 1.1)"),
     "a negative expression": value("KCURRA", "-(0.25 + 0.25)"),
     "names of one's own": HEADER.replace(
         RS, "#define RS_COLD 2.5\n#define WARM(ohm, factor) ((ohm) * (factor))\n#define MOTOR_RS_OHM WARM(RS_COLD, 1.068)\n"),

@@ -15,6 +15,10 @@
 
 #if defined(NORM_RS) || defined(NORM_LSDTBASE) || defined(NORM_INVKFIBASE) || defined(NORM_DELTAT)
 #define PARAM_OF_AN1292 /* firmware/drive/param_text.c refuses it */
+#undef NORM_RS
+#undef NORM_LSDTBASE
+#undef NORM_INVKFIBASE
+#undef NORM_DELTAT
 #endif
 /* In userparams.h AN1292's forms stand for the number in their brackets, Q15(-0.5) for -0.5 and NORM_CURRENT(-0.09) for -0.09 A: parameters have
  * engineering units. A definition of AN1292's own there (its Example 2) means the same. */
