@@ -17,7 +17,11 @@
 
 /* 5/2 is 2 to C, and (5/2) too; 20/10 is what it looks like, of (20/10) nobody can tell. */
 #define IS_INTEGER(name) ((((name)*0 + 1) / 2) <= 0)
+#ifdef __OPTIMIZE__ /* as param_text.c: else no text is looked at */
 #define HAS_QUOTIENT(text) (sizeof(text) <= 80 && __builtin_strcspn(text, "/") < sizeof(text) - 1) /* a longer one is computed from other parameters */
+#else
+#define HAS_QUOTIENT(text) 0
+#endif
 #define IS_FRACTION(name) ((float)(1.0 * name) > PARAM_F(name) || (float)(1.0 * name) < PARAM_F(name))
 #define IS_DIVIDED(name) (HAS_QUOTIENT(PARAM_TEXT(name)) && IS_INTEGER(name) && (PARAM_TEXT(name)[0] == '(' || IS_FRACTION(name)))
 #define IS_CONSTANT(name) __builtin_constant_p((int32_t)PARAM_F(name))
