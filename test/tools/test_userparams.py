@@ -127,8 +127,15 @@ MISTAKES = {
 }
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("mistake", MISTAKES)
+def sampled(names) -> list:
+    """Each name with the PC's compiler and every sixth with the chip's: its build calls four compilations, and the words are those of one script."""
+    pc, *others = COMPILERS
+    names = list(names)
+    every = [(name, pc) for name in names] + [(name, other) for name in names[::6] for other in others]
+    return [pytest.param(name, *compiler.values, id=f"{name}-{compiler.id}", marks=compiler.marks) for name, compiler in every]
+
+
+@pytest.mark.parametrize("mistake, compiler", sampled(MISTAKES))
 def test_a_mistake_is_one_line_of_the_build_with_its_place(tmp_path, mistake, compiler):
     text, name, told = MISTAKES[mistake]
     where = place(text, told.split()[0]) if name else "userparams.h"
@@ -344,11 +351,16 @@ LEGAL = {
 }
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("style", LEGAL)
+@pytest.mark.parametrize("style, compiler", sampled(LEGAL))
 def test_what_c_allows_is_not_refused(tmp_path, style, compiler):
     (tmp_path / "more.h").write_text(RS, encoding="utf-8")
     assert checked(tmp_path, compiler, LEGAL[style]) == (0, [])
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("style", LEGAL)
+def test_what_c_allows_is_not_refused_by_the_compiler_alone(tmp_path, style, compiler):
+    (tmp_path / "more.h").write_text(RS, encoding="utf-8")
     assert compiled(tmp_path, compiler, LEGAL[style]) == ""
 
 
