@@ -348,7 +348,7 @@ tools_py := $(call py_tests,static) $(call py_tests,coverage)
 modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_table.h)
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps, no search for a parameter's ends.
-slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps sensitivity image_build examples progress recipes bench_pages userparams live_% make_% campaign setup suites),$(bench_py))
+slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps sensitivity image_build examples progress recipes bench_pages userparams import live_% make_% campaign setup suites),$(bench_py))
 sweep_suites := $(addprefix behaviour/test_,identify_motors fw_search low_speeds)
 longest := $(slow_suites)
 quick_suites := $(filter-out golden/% unit/test_param_ranges,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
