@@ -122,7 +122,7 @@ def test_the_risks_are_the_tuner_s_warnings_about_the_start():
     with motor_path(("viscous_friction = { value = 15.3e-6", "viscous_friction = { value = 0.0"),
                     ("coulomb_friction = { value = 0.004", "coulomb_friction = { value = 0.0"), ("value = 5.5e-6", "value = 6e-5")) as path:
         _, risks = fw_tune._header(motor_file.load(str(path)), board)
-    assert re.search(r"\Athe unloaded rotor still swings .*: add \[mechanical\] coulomb_friction, which the no-load current gives\Z", risks)
+    assert re.search(r"\Athe unloaded rotor still swings .*; add \[mechanical\] coulomb_friction, which the no-load current gives: [0-9.]+ N m is enough\Z", risks)
     assert fw_tune._header(motor_file.load(HURST), board) == (HEADER, "")
 
 
