@@ -7,7 +7,7 @@
 #error userparams.h: SPEEDCNTR_ITERM and SPEEDCNTR_CTERM mean nothing: the load observer (LOAD_BANDWIDTH_HZ) takes the place of the integral, remove them
 #endif
 
-#pragma GCC diagnostic ignored "-Woverflow" /* what a value out of range does to the formulas of the relations */
+#pragma GCC diagnostic ignored "-Woverflow"    /* what a value out of range does to the formulas of the relations */
 #pragma GCC diagnostic ignored "-Wdiv-by-zero" /* IS_CONSTANT tells of it, by name */
 
 /* The motor's own 1/Kphi in a table: its relation says once if it does not fit. */
@@ -17,7 +17,7 @@
 
 /* 5/2 is 2 to C, and (5/2) too; 20/10 is what it looks like, of (20/10) nobody can tell. */
 #define IS_INTEGER(name) ((((name)*0 + 1) / 2) <= 0)
-#ifdef __OPTIMIZE__ /* as param_text.c: else no text is looked at */
+#ifdef __OPTIMIZE__                                                                                /* as param_text.c: else no text is looked at */
 #define HAS_QUOTIENT(text) (sizeof(text) <= 80 && __builtin_strcspn(text, "/") < sizeof(text) - 1) /* a longer one is computed from other parameters */
 #else
 #define HAS_QUOTIENT(text) 0
