@@ -37,8 +37,8 @@ RISE_S = 0.03
 FRICTION_SHARE = 0.05
 """Estimate: of the rated torque; 0.04 to 0.05 of the project's motors."""
 LEAST_INVKFI, LEAST_LS, MOST_LS = (float(text) for text in (parameters()["INVKFI_SPEED0"].low, parameters()["LS_OVER2LS0_SPEED0"].low, parameters()["LS_OVER2LS0_SPEED0"].high))
-KFI_LEAST, KFI_MOST = 0.6, 1.6
-"""An entry of 1/Kphi over the motor's: what the firmware's build accepts (PARAM_INVKFI_FITS)."""
+KFI_LEAST, KFI_MOST = number("PARAM_INVKFI_LEAST"), number("PARAM_INVKFI_MOST")
+"""What an entry of 1/Kphi may be of the motor's own."""
 SCALE_SAME = 0.005
 """A board file is written where the header's numbers differ by more."""
 SAMPLE_MARGIN_S = 1.0e-6

@@ -150,7 +150,7 @@ static void held_go_on(drive_t *d, const drive_params_t *p, speed_erpm_t omega_e
 static void held_has_turned(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     const speed_erpm_t first_erpm = held_speed(&d->run, d->run.held.emf_q12), now_erpm = held_speed(&d->run, emf);
-    held_turn_back(d, p, (int16_t)-held_turned(p, (speed_erpm_t)((first_erpm >> 1) + (now_erpm >> 1)), d->run.held.stopped_steps));
+    held_turn_back(d, p, (int16_t)-held_turned(p, qm_mean(first_erpm, now_erpm), d->run.held.stopped_steps));
     held_go_on(d, p, now_erpm, d->run.observer.load_q16);
 }
 

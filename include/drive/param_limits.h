@@ -247,7 +247,11 @@
     PARAM_RELATION_INVKFI(X, 13) PARAM_RELATION_INVKFI(X, 14) PARAM_RELATION_INVKFI(X, 15) PARAM_RELATION_INVKFI(X, 16) \
     PARAM_RELATION_INVKFI(X, 17)
 
-#define PARAM_INVKFI_FITS(i) (__builtin_fabsf(PARAM_F(INVKFI_SPEED##i) / PARAM_INVKFI - 1.1F) <= 0.5F)
+#define PARAM_INVKFI_LEAST 0.6 /* what an entry may be of the motor's own 1/Kphi; make import reads both */
+#define PARAM_INVKFI_MOST 1.6
+#define PARAM_INVKFI_FITS(i) \
+    (__builtin_fabsf(2.0F * PARAM_F(INVKFI_SPEED##i) / PARAM_INVKFI - PARAM_F(PARAM_INVKFI_MOST) - PARAM_F(PARAM_INVKFI_LEAST)) \
+     <= PARAM_F(PARAM_INVKFI_MOST) - PARAM_F(PARAM_INVKFI_LEAST))
 #define PARAM_RELATION_INVKFI(X, i) \
     X(PARAM_INVKFI_FITS(i), PARAM_NAMED(INVKFI_SPEED##i) " must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that, or make tune-fw")
 

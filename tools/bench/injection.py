@@ -102,16 +102,17 @@ def _sets(key: str, of: str = "") -> Callable[[float, str, Rating], Keys]:
 
 def _pulses(size: float, place: str, rating: Rating) -> Keys:
     """A torque that swings with the shaft's angle, as that of a piston."""
-    return {"load.pulse1_nm": pulse_nm(size * rating.torque_nm, float(place), rating), "load.pulse1_order": float(place)}
+    order = float(place)
+    return {"load.pulse1_nm": pulse_nm(size * rating.torque_nm, order, rating.inertia_kgm2, rating.speed_rpm), "load.pulse1_order": order}
 
 
-def pulse_nm(torque_nm: float, order: float, rating: Rating) -> float:
-    """What of a torque may swing so often in a turn: a motor with constant current swings by J w dw/dt = T, at most PULSE_SWING of its speed."""
-    omega = rating.speed_rpm * math.pi / 30.0
-    return min(torque_nm, PULSE_SWING * rating.inertia_kgm2 * order * omega ** 2)
+def pulse_nm(torque_nm: float, order: float, inertia_kgm2: float, rpm: float) -> float:
+    """What of a torque may swing `order` times in a turn: it swings a motor with constant current by J w dw/dt = T, at most PULSE_SWING of its speed."""
+    return min(torque_nm, PULSE_SWING * inertia_kgm2 * order * (rpm * math.pi / 30.0) ** 2)
 
 
 PULSE_SWING = 0.15
+"""Of the speed."""
 PULSE_ORDERS = ("1", "2")
 
 

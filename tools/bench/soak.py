@@ -19,7 +19,7 @@ from tools.common.board_keys import Values
 from tools.common.errors import UserError
 from tools.common.trace import wrapped_deg
 
-from . import command_common, draws, judge, page, reach, simulate
+from . import command_common, draws, injection, judge, page, reach, simulate
 from .board import Board
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, param, start_time_s
@@ -39,8 +39,6 @@ SAGS, WARM_R, WARM_PSI, TRUE_L = (0.87, 1.0), (0.7, 1.4), (0.8, 1.2), (0.75, 1.2
 """What the supply may sag to, and what the true motor may be of its header's: a wrong header, and temperature."""
 HOLD_S, HOLD_TORQUES = (0.01, 0.1), (1.3, 3.0)
 """How long a hand holds the shaft, and how hard: times the most torque that the drive has."""
-PULSE_SWING = 0.15
-"""Of the speed: by how much a load that pulses with the turn would swing a motor with constant current, at most."""
 MIDDLE = 0.05
 """Of the potentiometer's travel on each side: where the middle chooses no direction, and no speed."""
 VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
@@ -312,10 +310,10 @@ class _Drawing:
 
     def _pulse(self) -> None:
         """A load that pulses once or twice a turn, for a while."""
-        order, omega = self.r.choice((1.0, 2.0)), abs(self.rpm) * math.pi / 30.0
-        room_nm = max(self._most_nm(self.rpm) - self.load_nm, 0.0)
-        swing_nm = PULSE_SWING * self._inertia_kgm2 * order * omega ** 2
-        self._set({"load.pulse1_nm": self.r.random() * min(room_nm, self.load_nm, swing_nm), "load.pulse1_order": order})
+        order = float(self.r.choice(injection.PULSE_ORDERS))
+        most_nm = min(max(self._most_nm(self.rpm) - self.load_nm, 0.0), self.load_nm)
+        most_nm = injection.pulse_nm(most_nm, order, self._inertia_kgm2, abs(self.rpm))
+        self._set({"load.pulse1_nm": self.r.random() * most_nm, "load.pulse1_order": order})
         self._rest(0.0, 1.0)
         self._set({"load.pulse1_nm": 0.0})
         self.now_s += 0.2

@@ -123,8 +123,8 @@ def _true_motor(case: Case, bench: Bench, rpm: float) -> dict[str, float]:
     values = {key: value for key, value in {**bench.board.values.values, **bench.motor.values.values}.items() if not isinstance(value, tuple)}
     result = injection.true_motor(case, values)
     if case.pulse:
-        rating = injection.Rating(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, values["mech.inertia_kgm2"], rpm)
-        result["load.pulse1_nm"] = injection.pulse_nm(case.pulse * motor_file.load(str(bench.motor.path)).rated_torque_nm, 1.0, rating)
+        most_nm = case.pulse * motor_file.load(str(bench.motor.path)).rated_torque_nm
+        result["load.pulse1_nm"] = injection.pulse_nm(most_nm, 1.0, values["mech.inertia_kgm2"], rpm)
     return result
 
 
