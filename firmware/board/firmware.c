@@ -142,6 +142,7 @@ QM_INLINE void firmware_supervise(void)
 QM_INLINE void firmware_judge(uint16_t elapsed_ms)
 {
     firmware_find(signals_d_current(&judged.signals, &board_drive, &board_params));
+    firmware_find(signals_offset(&judged.signals, &board_drive, &board_params));
     if (overload_tick(&judged.overload, &board_drive, &board_params, elapsed_ms)) {
         firmware_trip(FAULT_OVERTEMPERATURE);
     }

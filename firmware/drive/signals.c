@@ -231,3 +231,28 @@ uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t 
     s->id_q16 += qm_mulsu(qm_hi(off_q16), 1u << (16 - SIGNALS_MEAN_SHIFT)) + (int32_t)((uint16_t)off_q16 >> SIGNALS_MEAN_SHIFT); /* off >> shift */
     return (uint16_t)((qm_hi(s->id_q16) > p->id_off_q13) ? FAULT_CURRENT_SENSOR : FAULT_NONE);
 }
+
+#define SIGNALS_TURNS_MS 256u      /* from here on a whole turn ends the sum: angles that the estimator has wrong at its ends count less and less */
+#define SIGNALS_TURN_MOST_MS 1024u /* a turn that does not end is none */
+
+uint16_t signals_offset(signals_t *s, const drive_t *d, const drive_params_t *p)
+{
+    const dq_t emf = estimator_emf(&d->run.estimator);
+    const sincos_t at = d->frame;
+    const uint16_t whole = (uint16_t)(s->sine_q15 < 0 && at.sin >= 0), before = s->emf_stood;
+    s->sine_q15 = at.sin;
+    if (!signals_are_judged(d) || held_angle_stands(&d->run.held) || s->emf_ms >= SIGNALS_TURN_MOST_MS) {
+        s->emf_stood = 0;
+    } else if (!whole || s->emf_ms < SIGNALS_TURNS_MS) {
+        s->emf_q12.cosine += qm_hi(2 * (qm_mulss(emf.d, at.cos) - qm_mulss(emf.q, at.sin)));
+        s->emf_q12.sine += qm_hi(2 * (qm_mulss(emf.d, at.sin) + qm_mulss(emf.q, at.cos)));
+        s->emf_ms++;
+        return (uint16_t)FAULT_NONE;
+    } else {
+        s->emf_stood = (uint16_t)(signals_beat(&s->emf_q12) > qm_muluu(s->emf_ms, (uint16_t)p->adaptation.emf_least_q12));
+    }
+    s->emf_q12.cosine = 0;
+    s->emf_q12.sine = 0;
+    s->emf_ms = 0;
+    return (uint16_t)((before & s->emf_stood) ? FAULT_CURRENT_SENSOR : FAULT_NONE);
+}

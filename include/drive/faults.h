@@ -51,7 +51,7 @@
     X(13, WATCHDOG, FAULT_STAYS, "reset_take", \
       "the watchdog reset the processor: the background or the control interrupt stood still", \
       "look for a loop that waits without bound in what was added; board_reset_cause is RCON as the start found it") \
-    X(14, CURRENT_SENSOR, FAULT_STAYS, "signals_which_is_wrong, signals_d_current", \
+    X(14, CURRENT_SENSOR, FAULT_STAYS, "signals_which_is_wrong, signals_d_current, signals_offset", \
       "voltages and currents did not fit the motor for a tenth of a second, or the d current stayed off its reference: a current signal is wrong", \
       "check AN0 and AN1, the shunts and their amplifiers; with the motor at rest both must read the middle; check MOTOR_LS_MH") \
     X(15, BUS_SENSOR, FAULT_STAYS, "protection_check_model", \

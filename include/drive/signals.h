@@ -1,6 +1,6 @@
 /* Do the measured currents fit? An open phase and a wrong current signal, by two rules that see different motors.
  *
- *                   the law's rule: signals_check()                      the background's rule: signals_phases(), signals_d_current()
+ *                   the law's rule: signals_check()                      the background's rule: signals_phases(), _d_current(), _offset()
  * asks first        are innovations large in time with the electrical
  *                   angle, or beyond what a load can do?
  * asks              do voltages and currents fit the motor?              does what flows follow what is asked for?
@@ -8,7 +8,9 @@
  * OPEN_PHASE        the least sum is below a quarter of the largest      a phase's measured sum, as a share of what is asked of it, is
  *                                                                        below a quarter of the best phase's share
  * CURRENT_SENSOR    else                                                 the d current stays off its reference
- * finds             what the observer or the voltage shows, in 0.1 s     what the controllers hide from the model: noise, a small load
+ *                                                                        or whole turns leave a back-EMF
+ * finds             what the observer or the voltage shows, in 0.1 s     what the controllers hide from the model: noise, a small load,
+ *                                                                        an offset that swings a slow rotor
  * no limit excuses  a voltage that drives no current                     the d axis takes its voltage first, each phase its share */
 #ifndef DRIVE_SIGNALS_H
 #define DRIVE_SIGNALS_H
@@ -49,11 +51,15 @@ typedef struct {
     uint16_t samples;            /**< in the sums */
 } signals_sums_t;
 
-/** Mean size of the d current's deviation over half a second, and what the phases carry. Zero is a valid start. */
+/** Mean size of the d current's deviation over half a second, what the phases carry, and what stands in the back-EMF. Zero is a valid start. */
 typedef struct {
     int32_t id_q16; /**< Q13 counts with 16 fraction bits */
     signals_sums_t sums;
-    uint16_t sampled_tick; /**< period of the last sample */
+    uint16_t sampled_tick;  /**< period of the last sample */
+    signals_beat_t emf_q12; /**< sum of the back-EMF along the stator's alpha and beta axes */
+    uint16_t emf_ms;        /**< in the sum */
+    uint16_t emf_stood;     /**< 1: the last sum was too large */
+    int16_t sine_q15;       /**< of the frame's angle when it was last looked at: a whole turn ends where it becomes positive */
 } signals_t;
 
 /** Every pass of the background. @return drive_fault_t: OPEN_PHASE when a phase carries next to none of what is asked of it, or none */
@@ -62,5 +68,11 @@ uint16_t signals_phases(signals_t *s, const drive_t *d, const drive_params_t *p)
 /** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise
  *  make it, or none */
 uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t *p);
+
+/** Every millisecond in the background. Over whole turns the mean of a back-EMF is zero in the stator's frame, however the speed swings, for its
+ *  integral is the flux, a function of the angle. What stays is R dI + V_dead 2/pi asin(dI/I) of a current signal that is off by dI, for the controllers
+ *  let the current flow of which the signal makes a sine. Legs whose dead times differ by a fifth leave as much as is allowed.
+ *  @return drive_fault_t: CURRENT_SENSOR when it is more over two times a quarter of a second and the turn's rest, or none */
+uint16_t signals_offset(signals_t *s, const drive_t *d, const drive_params_t *p);
 
 #endif

@@ -105,6 +105,24 @@ void test_a_noisy_current_signal_is_named(void)
     assert_fault(FAULT_CURRENT_SENSOR);
 }
 
+void test_an_offset_that_swings_a_slow_loaded_rotor_is_named_and_a_third_of_it_is_ridden_through(void)
+{
+    static const char *const signals[] = { "fault.ia_error_a", "fault.ib_error_a" };
+    for (size_t i = 0; i < 2; i++) {
+        for (double offset_a = -0.075; offset_a < 0.1; offset_a += 0.15) {
+            run_at(210.0);
+            set("load.constant_nm", 0.028);
+            wait_s(0.5);
+            set(signals[i], offset_a / 3.0);
+            TEST_ASSERT_EQUAL_INT(FAULT_NONE, (seconds_to_fault(1.5), board_drive.fault));
+            set(signals[i], offset_a);
+            TEST_ASSERT_TRUE(seconds_to_fault(1.5) < 0.95);
+            assert_fault(FAULT_CURRENT_SENSOR);
+            set(signals[i], 0.0);
+        }
+    }
+}
+
 void test_first_fault_is_the_one_that_is_kept(void)
 {
     run_at(1500.0);

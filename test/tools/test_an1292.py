@@ -91,7 +91,7 @@ def test_every_name_that_goes_to_the_tuner_is_a_parameter_or_a_key_of_a_file(par
 def test_the_tables_are_read_in_ampere_and_as_shares_of_base_speed(parms):
     tables = parms().tables
     assert [round(entry.idref_a, 3) for entry in tables[:3]] == [0.0, -0.3, -0.6] and tables[17].idref_a == pytest.approx(-2.6, abs=2e-4)
-    assert tables[0].inv_kfi == 1.0 and tables[17].inv_kfi == pytest.approx(16445 / 7945) and tables[1].ls_ratio == pytest.approx(0.48, abs=1e-4)
+    assert tables[0].inv_kfi == 1.0 and tables[17].inv_kfi == pytest.approx(13045 / 7945) and tables[1].ls_ratio == pytest.approx(0.48, abs=1e-4)
     assert parms(re.sub(r"#define (IDREF|INVKFI|LS_OVER2LS0)_SPEED.*\n", "", HEADER)).tables == []
 
 

@@ -194,6 +194,97 @@ void test_noise_of_one_phase_opens_no_other(void)
     }
 }
 
+/* ---- what whole turns leave of the back-EMF ---- */
+
+#define TURN_STEP 1147u /* angle counts a millisecond: 17.5 turns a second */
+#define TURNS_MS 256u   /* and the rest of a turn is a sum */
+
+/** The look of a millisecond at a rotor with this back-EMF of its own, and one that stands in the stator's frame. */
+static uint16_t offset_look(angle_t angle, int16_t emf_q12, alphabeta_t stands_q12)
+{
+    const sincos_t at = trig_sincos(angle);
+    drive.frame = at;
+    drive.run.estimator.e_d_q28 = (stands_q12.alpha * (int32_t)at.cos + stands_q12.beta * (int32_t)at.sin) * 2;
+    drive.run.estimator.e_q_q28 = (stands_q12.beta * (int32_t)at.cos - stands_q12.alpha * (int32_t)at.sin) * 2 + emf_q12 * 65536;
+    return signals_offset(&signals, &drive, &params);
+}
+
+/** Milliseconds until it is found, at most 3000. */
+static uint16_t ms_until_offset(int16_t alpha_q12, int16_t beta_q12, uint16_t step)
+{
+    const alphabeta_t stands_q12 = { alpha_q12, beta_q12 };
+    uint16_t ms = 0, found = (uint16_t)FAULT_NONE;
+    while (ms < 3000u && found == (uint16_t)FAULT_NONE) {
+        ms++;
+        found = offset_look((angle_t)(ms * step), 700, stands_q12);
+    }
+    TEST_ASSERT_EQUAL_UINT16((ms < 3000u) ? FAULT_CURRENT_SENSOR : FAULT_NONE, found);
+    return ms;
+}
+
+/** Two sums, or three where the first one began within a turn. */
+static void expect_offset_found(int16_t alpha_q12, int16_t beta_q12, uint16_t step)
+{
+    const uint16_t ms = ms_until_offset(alpha_q12, beta_q12, step);
+    TEST_ASSERT_TRUE(ms >= 2u * TURNS_MS && ms <= 3u * (TURNS_MS + 58u));
+}
+
+void test_a_back_emf_that_stands_in_the_stator_is_found_within_a_second_whatever_its_direction_and_the_rotor_s(void)
+{
+    const int16_t limit = params.adaptation.emf_least_q12, above = (int16_t)(limit + 6), below = (int16_t)(limit - 6);
+    EACH_DIRECTION(sign) {
+        const uint16_t step = (sign > 0) ? TURN_STEP : (uint16_t)(0u - TURN_STEP);
+        EACH_DIRECTION(side) {
+            setUp();
+            expect_offset_found((int16_t)(side * above), 0, step);
+            setUp();
+            expect_offset_found(0, (int16_t)(side * above), step);
+            setUp();
+            TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset((int16_t)(side * below), 0, step));
+            setUp();
+            TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(0, (int16_t)(side * below), step));
+        }
+    }
+}
+
+/** The speed swings with the turn by half of itself, as a load or an offset makes it: the back-EMF follows, and none of it stands. */
+void test_a_speed_that_swings_with_the_turn_leaves_none(void)
+{
+    static const alphabeta_t none = { 0, 0 };
+    uint32_t angle_q16 = 0;
+    uint16_t ms;
+    for (ms = 0; ms < 3000u; ms++) {
+        const int16_t swing_q15 = trig_sincos((angle_t)(angle_q16 >> 16)).sin / 2;
+        const uint32_t step_q16 = (uint32_t)TURN_STEP * (uint32_t)(65536 + 2 * swing_q15);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, offset_look((angle_t)((angle_q16 + step_q16 / 2u) >> 16), (int16_t)(700 + 700 * (int32_t)swing_q15 / 32768), none));
+        angle_q16 += step_q16;
+    }
+}
+
+void test_one_sum_alone_is_none_and_the_next_is_summed_anew(void)
+{
+    const alphabeta_t stands_q12[] = { { (int16_t)(3 * params.adaptation.emf_least_q12), 0 }, { 0, 0 } };
+    uint16_t ms;
+    for (ms = 0; ms < 3000u; ms++) {
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, offset_look((angle_t)(ms * TURN_STEP), 700, stands_q12[(ms / 286u) & 1u]));
+    }
+}
+
+void test_a_start_s_d_current_an_angle_that_stands_and_a_turn_without_end_are_no_whole_turns(void)
+{
+    const int16_t above = (int16_t)(2 * params.adaptation.emf_least_q12);
+    drive.run.handover.id_q13 = 10;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(above, 0, TURN_STEP));
+    drive.run.handover.id_q13 = 0;
+    drive.run.held.phase = (uint16_t)HELD_SETTLES;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(above, 0, TURN_STEP));
+    drive.run.held.phase = (uint16_t)HELD_NOT;
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(above, 0, 0));
+    TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(above, 0, 65536 / 1100));
+    setUp();
+    TEST_ASSERT_UINT16_WITHIN(300, 1800, ms_until_offset(above, 0, 65536 / 900));
+}
+
 /* ---- signals that do not fit the motor ---- */
 
 /** What the innovations are like. */
