@@ -1,6 +1,6 @@
 # foc33: builds the firmware for the PC, runs it on the virtual board, and tests it. `make` alone lists the targets.
 #
-# Variables: SCENARIO MOTOR BOARD SET OUT (what to run, on which board, where to write), DEFINES USERPARAMS (which firmware), VARIANT SAN (a build in
+# Variables: SCENARIO MOTOR BOARD SET OUT (what to run, on which board, where to write), DEFINES USERPARAMS APP (which firmware), VARIANT SAN (a build in
 # a folder of its own; of make bringup a miswired board), ONLY (names of test suites), PYTHON RUBY CC (tools to use), INSTALL=no (say what is missing, install nothing),
 # FOC33_QUIET=1 (no progress), V=1 (show the commands).
 
@@ -44,7 +44,10 @@ board_rooms := $(addprefix tools/,plant chip vboard cpu_host)
 board_includes := $(board_rooms:%=-I%)
 # One unit of them all, as the image (tools/make/image.mk); the parameters' checks are no code, and a harness may have a loop of its own.
 params_source := firmware/drive/param_text.c firmware/drive/param_check.c
-firmware_sources := $(filter-out $(params_source),$(wildcard firmware/*/*.c firmware/*/*/*.c))
+# The application: a file of firmware/app by its name, or a path to any, which is copied as userparams.h is. APP=panel if none is named.
+app_copy := build/app$(suffix)/app.c
+app_source := $(or $(wildcard firmware/app/$(or $(filter-out .%,$(APP)),panel).c),$(app_copy))
+firmware_sources := $(filter-out $(params_source),$(wildcard firmware/board/*.c firmware/control/*.c firmware/drive/*.c firmware/*/modes/*.c)) $(app_source)
 includes_of = $(foreach file,$1,'$(hash)include "$(file)"')
 hash := \#
 unit := $B/unit.o
@@ -124,8 +127,8 @@ tuner = $(alone) $(python) -m tuning
 board = $(if $(BOARD),--board $(call quoted,$(BOARD)))
 what = $(if $(MOTOR),--motor $(call quoted,$(MOTOR))) $(board) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS)))
 options = $(what) $(out)
-scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES)))
-ready = $(if $(USERPARAMS)$(DEFINES),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
+scenario = $(if $(SCENARIO),$(call quoted,$(SCENARIO))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(APP),--app $(call quoted,$(APP)))
+ready = $(if $(USERPARAMS)$(DEFINES)$(APP),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,$(MAKE) vboard))
 
 # MOTOR=all: the target for each motor of tuning/motors, with its own header; fails at the end if one of them did.
 every = $(filter all,$(MOTOR))
@@ -134,7 +137,7 @@ every_motor = failed=; for motor in $(basename $(notdir $(wildcard tuning/motors
     test -z "$$failed" || { echo "foc33: $@ fails for$$failed" >&2; exit 1; }
 
 .PHONY: sensitivity anymotor bringup run recorder scenarios keys list-motors table2 starts motors robust loadsteps lowspeed catch pulse held setup-run
-run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... USERPARAMS= OUT=folder]
+run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... APP=name USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
 	@$(front_end) run $(scenario) $(options)
@@ -276,6 +279,16 @@ $B/flags: FORCE $(if $(USERPARAMS),$B/header/userparams.h)
 	$(no_parameters)
 	$(call remember,$(compile))
 
+apps = $(patsubst firmware/app/%.c,%,$(wildcard firmware/app/*.c))
+$(app_copy): FORCE
+	@test -f $(call quoted,$(APP)) || { echo foc33: no application, $(call quoted,APP=$(APP)): use one of $(apps) of firmware/app, or name a file >&2; exit 2; }
+	@mkdir -p $(@D); { printf '#line 1 "%s"\n' "$$(printf %s $(call quoted,$(APP)) | sed 's/[\\"]/\\&/g')"; cat $(call quoted,$(APP)); } >$@.new && \
+	    { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
+
+app_shown = $(if $(filter $(app_copy),$(app_source)),$(APP),$(app_source))
+$B/app.checked: $(app_source) $B/flags tools/make/app.sh $(wildcard include/app/*.h) | $B/params
+	@tools/make/app.sh $@ $< $(call quoted,$(app_shown)) nm $(compile)
+
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))
 
@@ -310,7 +323,7 @@ $B/unit.c: FORCE
 $B/law.c: FORCE
 	$(call remember_lines,$(call includes_of,$(filter firmware/control/% firmware/drive/%,$(firmware_sources))))
 
-$(unit): $B/unit.c $B/flags | $B/params
+$(unit): $B/unit.c $B/flags $(app_source) | $B/params $B/app.checked
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
 $B/libfirmware.a: $(firmware_objects) $B/contents

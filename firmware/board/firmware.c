@@ -1,6 +1,7 @@
 /* Start-up order and the background loop: panel, supervision of the control interrupt, watch variables, status line. */
 #include "board/firmware.h"
 
+#include "board/application.h"
 #include "board/mclv.h"
 #include "board/modes/mode_board.h"
 #include "board/peripherals.h"
@@ -12,15 +13,6 @@
 #include "drive/signals.h"
 
 #define PERIODS_PER_MS PARAM_PERIODS(0.001F)
-/* A bit of a port: one instruction for each of its values, where an assignment takes seven. */
-#define SWITCH(bit, on) \
-    do { \
-        if (on) { \
-            (bit) = 1; \
-        } else { \
-            (bit) = 0; \
-        } \
-    } while (0)
 #define COUNT_MS 100u
 #define LEAST_TICKS PARAM_PERIODS(0.097F) /* of a tenth of a second: 3 % less */
 
@@ -34,7 +26,7 @@ typedef struct {
 } judged_t;
 
 drive_t board_drive BOARD_UNSET;
-panel_t board_panel BOARD_UNSET;
+request_t board_request BOARD_UNSET;
 retry_t board_retry BOARD_UNSET;
 #if SCOPE
 remote_t scope_command; /* cleared: remote_init() leaves what the client has not written */
@@ -67,7 +59,8 @@ void firmware_init(void)
     drive_zero(&judged, sizeof judged);
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
-    panel_init(&board_panel);
+    application_init();
+    request_init(&board_request);
     mode_panel_init();
     retry_init(&board_retry);
 #if SCOPE
@@ -153,19 +146,11 @@ void firmware_background(void)
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
     firmware_supervise();
     if (elapsed_ms != 0u) {
-        panel_inputs_t in;
-        panel_lights_t lights;
         last_ms_tick = (uint16_t)(last_ms_tick + elapsed_ms * PERIODS_PER_MS);
-        in.s2_down = BOARD_S2_DOWN();
-        in.s3_down = BOARD_S3_DOWN();
-        in.elapsed_ms = elapsed_ms;
-#if SCOPE
-        in.remote = &scope_command;
-#endif
-        lights = mode_panel(&in);
-        SWITCH(BOARD_LED_ALIVE, lights.led_alive);
-        SWITCH(BOARD_LED_RUN, lights.led_run);
-        retry_tick(&board_retry, &board_panel, &board_drive, elapsed_ms);
+        if (!mode_panel(elapsed_ms)) {
+            application_tick(elapsed_ms);
+        }
+        retry_tick(&board_retry, &board_request, &board_drive, elapsed_ms);
         selftest_part(SELFTEST_PART_PANEL);
         watch_refresh();
         firmware_judge(elapsed_ms);

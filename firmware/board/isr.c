@@ -1,5 +1,6 @@
 /* The interrupts: the control interrupt that is one PWM period, the slow work's behind it, the fault input, and the traps. */
 #include "board/firmware.h"
+#include "board/application.h"
 #include "board/scope.h"
 #include "board/mclv.h"
 #include "board/peripherals.h"
@@ -138,7 +139,7 @@ void BOARD_ISR _T2Interrupt(void)
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
-    board_panel.pot_q15 = (int16_t)ADC1BUF0;
+    board_pot.now_q15 = (int16_t)ADC1BUF0;
     if (drive_slow(&board_drive, &board_params, &raw)) {
         if (duties_are_the_laws()) {
             P1OVDCON = BOARD_OUTPUTS_PWM;
@@ -157,6 +158,7 @@ void BOARD_ISR _T2Interrupt(void)
         recorder_write(&board_recorder, &board_drive, (int16_t)ADC1BUF1, (int16_t)ADC1BUF2, (int16_t)ADC1BUF3);
     }
     mode_record();
+    application_watch();
 #if SCOPE
     scope_tick(&board_lnet.scope, board_scope_array);
 #endif

@@ -16,7 +16,7 @@ uint16_t memory_is_variable(uint16_t address, uint16_t bytes)
 
 /** The usual row in a straight line. Its addresses are volatile to be read first: none is used in the cycle after it was read.
  *  @return where the next one goes */
-static int16_t *scope_copy_usual(const scope_t *s)
+QM_INLINE int16_t *scope_copy_usual(const scope_t *s)
 {
     const volatile int16_t *first = s->source[0], *second = s->source[1], *third = s->source[2], *fourth = s->source[3];
     int16_t *at = s->at;
@@ -28,7 +28,7 @@ static int16_t *scope_copy_usual(const scope_t *s)
 }
 
 /** A row is there while the trigger is looked for. After the trigger's, scope_turn() ends a round. @param following where it ended */
-static void scope_look(scope_t *s, const volatile uint16_t *trigger, int16_t *following)
+QM_INLINE void scope_look(scope_t *s, const volatile uint16_t *trigger, int16_t *following)
 {
     if ((int16_t)(*trigger ^ s->flip) < s->level) {
         s->is_low = 0xFFFFu;
@@ -43,7 +43,7 @@ static void scope_look(scope_t *s, const volatile uint16_t *trigger, int16_t *fo
 }
 
 /** Before a row after the trigger's, or without one: a new round at the array's end. @param begin of the array */
-static void scope_turn(scope_t *s, int16_t *begin)
+QM_INLINE void scope_turn(scope_t *s, int16_t *begin)
 {
     if (s->at == s->last) {
         s->at = begin;
@@ -51,7 +51,7 @@ static void scope_turn(scope_t *s, int16_t *begin)
 }
 
 /** Such a row is there. @param following where it ended */
-static void scope_go_on(scope_t *s, int16_t *following)
+QM_INLINE void scope_go_on(scope_t *s, int16_t *following)
 {
     s->at = following;
     if (--s->left == 0u) {
@@ -61,7 +61,7 @@ static void scope_go_on(scope_t *s, int16_t *following)
 
 /** A row is there before the trigger is looked for: there is always room for one more. @param following where it ended
  *  @param is_rare what it is from the trigger's search on */
-static void scope_fill(scope_t *s, int16_t *following, uint16_t is_rare)
+QM_INLINE void scope_fill(scope_t *s, int16_t *following, uint16_t is_rare)
 {
     s->at = following;
     if (--s->before == 0u) {
@@ -224,7 +224,7 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
 }
 
 /** Words of any number. @return where the next row goes */
-static int16_t *copy_words(const scope_t *s)
+QM_INLINE int16_t *copy_words(const scope_t *s)
 {
     const volatile int16_t *const volatile *source = s->source;
     int16_t *at = s->at;

@@ -2,6 +2,7 @@
 #include "board/selftest_run.h"
 
 #ifndef SELFTEST_OFF
+#include "board/application.h"
 #include "board/firmware.h"
 #include "board/peripherals.h"
 #include "board/reset.h"
@@ -196,7 +197,7 @@ static void test_ram_slice(void)
 
 static void test_in_silence(void)
 {
-    if (!selftest_variables_hold(&board_drive) || !panel_holds(&board_panel)) {
+    if (!selftest_variables_hold(&board_drive) || !request_holds(&board_request)) {
         selftest_fail(SELFTEST_VARIABLES);
     }
     if (!selftest_flow_holds(&board_drive)) {
@@ -215,7 +216,7 @@ static void start_adc(void)
 {
     if (board_drive.state == (uint16_t)DRIVE_STOPPED && !board_drive.command.run) {
         adc_since = board_drive.ticks;
-        adc_pot_q15 = board_panel.pot_q15;
+        adc_pot_q15 = board_pot.now_q15;
         AD1CHS0 = BOARD_AN_OFF;
     }
 }
@@ -223,10 +224,10 @@ static void start_adc(void)
 /** The second sample after the change is AVSS for sure; the panel gets the potentiometer's sample from before. */
 static void end_adc(void)
 {
-    int16_t zero_q15 = board_panel.pot_q15;
+    int16_t zero_q15 = board_pot.now_q15;
     if (AD1CHS0 == BOARD_AN_OFF && (uint16_t)(board_drive.ticks - adc_since) >= 3u) {
         AD1CHS0 = BOARD_AD1CHS0;
-        board_panel.pot_q15 = adc_pot_q15;
+        board_pot.now_q15 = adc_pot_q15;
         if (zero_q15 > ADC_ZERO_MOST) {
             selftest_fail(SELFTEST_ADC);
         }

@@ -2,7 +2,7 @@
 #include "drive/remote.h"
 
 #include "drive/drive.h"
-#include "drive/panel.h"
+#include "drive/request.h"
 
 #if SCOPE
 void remote_give_up(remote_t *r)
@@ -13,6 +13,11 @@ void remote_give_up(remote_t *r)
     r->has_started = 0;
 }
 
+uint16_t remote_is_in_command(const remote_t *r)
+{
+    return r->is_taken;
+}
+
 void remote_init(remote_t *r)
 {
     remote_give_up(r);
@@ -21,11 +26,11 @@ void remote_init(remote_t *r)
 }
 
 /** As S2 would in a fault. */
-static void remote_clear(panel_t *panel, drive_t *d)
+static void remote_clear(request_t *request, drive_t *d)
 {
     if (d->fault != (uint16_t)FAULT_NONE) {
         d->command.clear_fault = 1;
-        panel->interrupted = 0;
+        request->interrupted = 0;
     }
 }
 
@@ -36,20 +41,20 @@ static uint16_t remote_holds(const remote_t *r, uint16_t elapsed_ms)
 }
 
 /** A start is a change from 0 to 1, so that neither a new lease nor the end of a fault is one; a stop is a 0. */
-static void remote_wish(remote_t *r, panel_t *panel, const drive_t *d, uint16_t starts)
+static void remote_wish(remote_t *r, request_t *request, const drive_t *d, uint16_t starts)
 {
     if (r->run == 0u) {
         r->has_started = 0;
-        panel->wish_run = 0;
-        panel->interrupted = 0;
+        request->wish_run = 0;
+        request->interrupted = 0;
     } else if (starts && d->fault == (uint16_t)FAULT_NONE) {
-        r->has_started = (uint16_t)(r->has_started || !panel->wish_run);
-        panel->wish_run = 1;
+        r->has_started = (uint16_t)(r->has_started || !request->wish_run);
+        request->wish_run = 1;
     } else { /* as it is */
     }
 }
 
-void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
+void remote_tick(remote_t *r, request_t *request, drive_t *d, uint16_t elapsed_ms)
 {
     uint16_t starts = (uint16_t)(r->run != 0u && !r->seen_run);
     r->seen_run = (uint16_t)(r->run != 0u);
@@ -60,12 +65,12 @@ void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
         r->is_taken = 1;
         r->lease_ms = (uint16_t)(r->lease_ms - elapsed_ms);
         if (r->clear_fault) {
-            remote_clear(panel, d);
+            remote_clear(request, d);
         }
-        remote_wish(r, panel, d, starts);
+        remote_wish(r, request, d, starts);
     } else if (r->is_taken) {
         if (r->has_started) {
-            panel->wish_run = 0;
+            request->wish_run = 0;
         }
         remote_give_up(r);
     } else { /* the panel is in command */
@@ -73,13 +78,8 @@ void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms)
     r->clear_fault = 0;
 }
 
-int16_t remote_target(const remote_t *r, const drive_params_t *p, int16_t of_panel)
+int16_t remote_target(const remote_t *r, int16_t of_panel)
 {
-    int16_t low = mode_target_range(p, 0).low, high = mode_target_range(p, 1).high, size;
-    if (!r->is_taken || r->mode != (uint16_t)REMOTE_TARGET) {
-        return of_panel;
-    }
-    size = qm_clamp(qm_abs(r->target_erpm), low, high);
-    return (int16_t)((r->target_erpm < 0) ? -size : size);
+    return (r->is_taken && r->mode == (uint16_t)REMOTE_TARGET) ? r->target_erpm : of_panel;
 }
 #endif

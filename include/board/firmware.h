@@ -4,7 +4,10 @@
 
 #include "drive/drive.h"
 #include "drive/modes/mode_table.h"
-#include "drive/panel.h"
+#include "drive/request.h"
+
+/* Not in main: the stack of neither stays while the other runs. The processor's test has registers of its own. */
+#define FIRMWARE_CALLED __attribute__((noinline))
 
 /** The drive's parameters, from userparams.h. */
 extern MODE_PARAMS_PLACE drive_params_t board_params;
@@ -12,8 +15,8 @@ extern MODE_PARAMS_PLACE drive_params_t board_params;
 /** The drive; the control interrupt runs it, the background only writes its commands. */
 extern drive_t board_drive;
 
-/** Buttons, potentiometer, lights. */
-extern panel_t board_panel;
+/** What is wished of the drive. */
+extern request_t board_request;
 
 /** What is left of the retries, and what began them. */
 extern retry_t board_retry;
@@ -26,15 +29,12 @@ extern remote_t scope_command;
 /** Not 0 from a failure of the clock to the next reset: on a wrong clock nothing may run, whatever the user presses. */
 extern volatile uint16_t board_clock_failed;
 
-/* Not in main: the stack of neither stays while the other runs. The processor's test has registers of its own. */
-#define FIRMWARE_CALLED __attribute__((noinline))
-
 /** All that main does before its loop: clock, pins, PWM with its outputs off, ADC, timer, UART, interrupts.
  *  A clock that does not come up, or fails later, raises FAULT_CLOCK, which S2 cannot clear; the outputs stay off. */
 void firmware_init(void) FIRMWARE_CALLED;
 
 /** Outputs off and the fault raised, from anywhere but the control interrupt. */
-void firmware_trip(drive_fault_t fault);
+void firmware_trip(drive_fault_t fault) FIRMWARE_CALLED;
 
 /** One pass of the loop. */
 void firmware_background(void) FIRMWARE_CALLED;

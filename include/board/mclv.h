@@ -94,6 +94,15 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 /* ---- LEDs ---- */
 #define BOARD_LED_ALIVE PIN_LATCH(BOARD_PIN_LED_ALIVE)
 #define BOARD_LED_RUN PIN_LATCH(BOARD_PIN_LED_RUN)
+/** A bit of a port: one instruction for each of its values, where an assignment takes seven. */
+#define BOARD_SWITCH(bit, on) \
+    do { \
+        if (on) { \
+            (bit) = 1; \
+        } else { \
+            (bit) = 0; \
+        } \
+    } while (0)
 /** Directions of a port: its outputs are the LEDs and U1TX; the PWM module takes its pins when it is enabled. */
 #define BOARD_TRIS(port) \
     ((uint16_t) ~(PIN_MASK(BOARD_PIN_LED_ALIVE, port) | PIN_MASK(BOARD_PIN_LED_RUN, port) | PIN_MASK(BOARD_PIN_UART_TX, port)))

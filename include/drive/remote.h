@@ -18,7 +18,7 @@ struct remote {
     uint16_t has_started; /**< 1: the run is the client's */
 };
 
-/** Member of panel_inputs_t. */
+/** Member of asked_t. */
 #if SCOPE
 #define REMOTE_INPUT remote_t *remote; /**< what a client asks for */
 #else
@@ -41,19 +41,23 @@ enum { REMOTE_MODE_TABLE(REMOTE_MODE) REMOTE_MODE_COUNT };
 /** The panel is in command. */
 void remote_init(remote_t *r);
 
+/** 1 while a client is in command. */
+uint16_t remote_is_in_command(const remote_t *r);
+
 /** Somebody has pressed S2: the panel is in command again, and what it wishes holds. */
 void remote_give_up(remote_t *r);
 
 /** A pass of the background, after the buttons: their wishes become the client's. At the lease's end the panel is in command again; a run that the
  *  client has started then ends in order. */
-void remote_tick(remote_t *r, panel_t *panel, drive_t *d, uint16_t elapsed_ms);
+void remote_tick(remote_t *r, request_t *request, drive_t *d, uint16_t elapsed_ms);
 
-/** The target in command. @param of_panel the potentiometer's */
-int16_t remote_target(const remote_t *r, const drive_params_t *p, int16_t of_panel);
+/** The target in command, of any size. @param of_panel the application's */
+int16_t remote_target(const remote_t *r, int16_t of_panel);
 #else
 #define remote_give_up(r) ((void)0)
-#define remote_tick(r, panel, d, elapsed_ms) ((void)0)
-#define remote_target(r, p, of_panel) (of_panel)
+#define remote_tick(r, request, d, elapsed_ms) ((void)0)
+#define remote_target(r, of_panel) (of_panel)
+#define remote_is_in_command(r) (0)
 #endif
 
 #endif

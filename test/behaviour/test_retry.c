@@ -7,7 +7,7 @@
 #define RETRY_COUNT 3
 
 #include "firmware/board/firmware.c"
-#include "firmware/drive/panel.c"
+#include "firmware/drive/request.c"
 
 void setUp(void)
 {

@@ -164,8 +164,14 @@ HEAD = "void firmware_background(void)\n{\n"
 NUMBERS, NOINLINE = "static volatile int32_t spoil_a, spoil_b;", "static __attribute__((noinline)) void"
 RECURSIVE = (f"{NOINLINE} spoil(volatile uint16_t n);\n{NOINLINE} spoil(volatile uint16_t n)\n{{\n    if (n) {{\n"
              "        spoil((uint16_t)(n - 1u));\n        n = 3;\n    }\n}")
-DEEP = (f"{NOINLINE} deeper(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n}}\n"
-        f"{NOINLINE} spoil(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n    deeper();\n    some[1] = 1;\n}}")
+
+
+def _frame(name: str, calls: str) -> str:
+    """A function with nearly as large a frame as the compiler lets pass."""
+    return f"{NOINLINE} {name}(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n    {calls}\n    some[1] = 1;\n}}\n"
+
+
+DEEP = _frame("deepest", "") + _frame("deeper", "deepest();") + _frame("spoil", "deeper();")
 
 
 @needs_compiler

@@ -6,7 +6,7 @@
 #include "panel_rig.h"
 
 #include "drive/modes/modes.h"
-#include "drive/panel.h"
+#include "drive/request.h"
 
 void setUp(void)
 {

@@ -5,7 +5,7 @@
 #include "law.c"
 #include "panel_rig.h"
 
-#include "drive/panel.h"
+#include "drive/request.h"
 
 void setUp(void)
 {
@@ -28,9 +28,9 @@ void test_no_position_in_the_middle_stops_a_reverse_run(void)
     TEST_ASSERT_EQUAL_INT16(-1, drive.direction);
     rig_tick(300);
     for (pot = 1000; pot >= -1000; pot--) {
-        the_panel.pot_q15 = pot;
-        the_panel.pot_q31 = (int32_t)pot * 65536;
-        the_panel.pot_used_q15 = pot;
+        the_pot.now_q15 = pot;
+        the_pot.smooth_q31 = (int32_t)pot * 65536;
+        the_pot.used_q15 = pot;
         panel_ms(1);
         TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     }

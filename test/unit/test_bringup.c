@@ -5,7 +5,7 @@
 #include "law.c"
 #include "bringup_rig.h"
 
-#include "drive/panel.h"
+#include "drive/request.h"
 
 void setUp(void)
 {

@@ -1,6 +1,8 @@
 /* Start-up order, the background loop, and the supervision of the control interrupt; the peripherals are mocks. */
 #include "hurst_params.h"
 
+#include "firmware/app/panel.c"
+#include "firmware/board/application.c"
 #include "firmware/board/firmware.c"
 
 #include "board/watch.h"
@@ -146,16 +148,16 @@ void test_outputs_are_off_before_anything_else_and_the_control_interrupt_comes_l
     uint16_t served = host_watchdog_serves;
     CORCON = 0xFFFF;
     INTCON1 = 0xFFFF;
-    board_panel.wish_run = 1;
-    board_panel.fast_range = 1;
+    board_request.wish_run = 1;
+    app_panel.fast_range = 1;
     start(0); /* the mocks enforce the order */
     TEST_ASSERT_EQUAL_UINT16(DRIVE_CALIBRATE, board_drive.state);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
     TEST_ASSERT_EQUAL_UINT16(served + 1u, host_watchdog_serves); /* it starts afresh */
     TEST_ASSERT_EQUAL_HEX16(0x0024, CORCON);
     TEST_ASSERT_EQUAL_UINT16(0, INTCON1bits.NSTDIS);
-    TEST_ASSERT_EQUAL_INT16(0, board_panel.wish_run);
-    TEST_ASSERT_EQUAL_INT16(0, board_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(0, board_request.wish_run);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
 }
 
 static uint16_t no_lock(int calls)
@@ -281,7 +283,7 @@ void test_panel_runs_once_a_millisecond_of_control_time_and_a_slow_pass_catches_
         for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
             board_drive.ticks = (uint16_t)(begin + cases[n][0]);
             pass(0);
-            TEST_ASSERT_EQUAL_UINT16(cases[n][1], board_panel.blink_ms);
+            TEST_ASSERT_EQUAL_UINT16(cases[n][1], app_panel.blink_ms);
         }
     }
 }

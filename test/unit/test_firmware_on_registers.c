@@ -2,6 +2,8 @@
 #include "hurst_params.h"
 
 #include "firmware/board/peripherals.c"
+#include "firmware/app/panel.c"
+#include "firmware/board/application.c"
 #include "firmware/board/firmware.c"
 #include "firmware/board/isr.c"
 #include "firmware/board/selftest_run.c"
@@ -164,9 +166,9 @@ void test_S2_leads_over_bootstrap_to_pwm_and_stops_and_nothing_else_does(void)
     TEST_ASSERT_TRUE(P1DC1 != 0u || P1DC2 != 0u || P1DC3 != 0u);
     PORTBbits.RB4 = 0; /* S3 changes the range of a running motor */
     board_ms(29);
-    TEST_ASSERT_EQUAL_INT16(0, board_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
     board_ms(1);
-    TEST_ASSERT_EQUAL_INT16(1, board_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(1, app_panel.fast_range);
     PORTAbits.RA8 = 0; /* and S2 again stops */
     board_ms(31);
     expect(DRIVE_STOPPED, FAULT_NONE, 0x0000);

@@ -5,7 +5,7 @@
 #include "law.c"
 #include "panel_rig.h"
 
-#include "drive/panel.h"
+#include "drive/request.h"
 
 static identify_t *const id = &drive.run.identify;
 static drive_control_t *const control = &drive.run.control;

@@ -15,7 +15,7 @@
 #include "unity.h"
 
 drive_t board_drive;
-panel_t board_panel;
+request_t board_request;
 retry_t board_retry;
 volatile uint16_t board_reset_cause;
 uint16_t board_selftest_parts;

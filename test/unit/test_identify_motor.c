@@ -5,7 +5,7 @@
 #include "law.c"
 #include "identify_rig.h"
 
-#include "drive/panel.h"
+#include "drive/request.h"
 
 static identify_values_t *const values = &drive.run.identify.values;
 
@@ -18,7 +18,7 @@ static void expect_off(void)
 {
     unknown_ms();
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "ended");
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
+    TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
 }
 
 void test_measures_motors_of_every_kind(void)
@@ -187,7 +187,7 @@ void test_S2_and_overcurrent_in_any_step_switch_off_at_once(void)
     for (step = IDENTIFY_RISE; step < IDENTIFY_STEP_COUNT; step++) {
         begin_until((identify_step_t)step);
         inputs.s2_down = 1;
-        panel_ms(PANEL_DEBOUNCE_MS);
+        panel_ms(BUTTON_DEBOUNCE_MS);
         rig_tick(1);
         EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, golden_row(step));
         TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_STOPPED, drive.run.identify.result);
@@ -199,7 +199,7 @@ void test_S2_and_overcurrent_in_any_step_switch_off_at_once(void)
         EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERCURRENT_SW, golden_row(step));
         panel_ms(1);
         TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_STOPPED, drive.run.identify.result);
-        TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
+        TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
     }
 }
 

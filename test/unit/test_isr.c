@@ -131,7 +131,7 @@ void test_samples_come_from_the_channels_of_the_facts(void)
     ADC1BUF2 = 8000u;            /* phase b */
     ADC1BUF3 = (uint16_t)raw_bus(30.0F);
     control_interrupts(400);
-    TEST_ASSERT_EQUAL_INT16(-11111, board_panel.pot_q15);
+    TEST_ASSERT_EQUAL_INT16(-11111, board_pot.now_q15);
     TEST_ASSERT_EQUAL_INT16(1000, board_drive.phases_q13.a);
     TEST_ASSERT_EQUAL_INT16(-2000, board_drive.phases_q13.b);
     TEST_ASSERT_INT16_WITHIN(2, BUS_Q15(30.0), qm_hi(board_drive.bus_q31));

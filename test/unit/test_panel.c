@@ -10,20 +10,20 @@ void setUp(void)
 
 void test_init_forgets_everything_and_puts_the_pot_at_its_lower_end(void)
 {
-    static const panel_inputs_t nothing = { 0, 0, 1 };
+    static const buttons_t nothing = { 0, 0, 1 };
     the_panel.s2.down_ms = 29;
     the_panel.s3.down_ms = 29;
-    the_panel.wish_run = 1;
+    the_request.wish_run = 1;
     the_panel.fast_range = 1;
     the_panel.blink_ms = 999;
-    panel_init(&the_panel);
+    panel_reset();
     TEST_ASSERT_EQUAL_UINT16(0, the_panel.s2.down_ms);
     TEST_ASSERT_EQUAL_UINT16(0, the_panel.s3.down_ms);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
+    TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
     TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
     TEST_ASSERT_EQUAL_UINT16(0, the_panel.blink_ms);
-    the_panel.pot_q15 = -32768;
-    the_lights = panel_tick(&the_panel, &drive, &params, &nothing);
+    the_pot.now_q15 = -32768;
+    panel_pass(&params, &nothing);
     TEST_ASSERT_INT16_WITHIN(6, 2500, drive.command.target_erpm);
 }
 
@@ -78,12 +78,12 @@ void test_each_press_acts_and_slow_passes_count_their_elapsed_time(void)
 
 void test_a_start_that_is_asked_for_is_not_begun_anew_before_the_interrupt_has_seen_it(void)
 {
-    static const panel_inputs_t nothing = { 0, 0, 1 };
-    the_panel.wish_run = 1;
-    (void)panel_tick(&the_panel, &drive, &params, &nothing);
+    static const buttons_t nothing = { 0, 0, 1 };
+    the_request.wish_run = 1;
+    panel_pass(&params, &nothing);
     TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     drive.forced.speed_q10 = 77;
-    (void)panel_tick(&the_panel, &drive, &params, &nothing);
+    panel_pass(&params, &nothing);
     TEST_ASSERT_EQUAL_INT32(77, drive.forced.speed_q10);
 }
 
@@ -152,7 +152,7 @@ void test_S2_while_stopping_runs_on_at_once(void)
     rig_tick(1);
     drive.state = (uint16_t)DRIVE_STOPPING;
     drive.command.run = 0;
-    the_panel.wish_run = 0;
+    the_request.wish_run = 0;
     press_s2(29);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
     press_s2(50);
@@ -212,7 +212,7 @@ void test_pot_arrives_at_the_command_over_ten_milliseconds(void)
         panel_turn_pot((uint16_t)cases[n][0]);
         TEST_ASSERT_INT16_WITHIN(15, cases[n][1], drive.command.target_erpm);
     }
-    the_panel.pot_q15 = 32704;
+    the_pot.now_q15 = 32704;
     panel_ms(10); /* 1 - 0.9^10 = 65 % */
     TEST_ASSERT_INT16_WITHIN(300, (int16_t)(2500 + 0.65F * 11500.0F), drive.command.target_erpm);
 }
@@ -222,7 +222,7 @@ void test_pot_noise_of_one_step_does_not_move_the_target_and_two_steps_do(void)
     int16_t before = 0, ms;
     panel_turn_pot(500);
     for (ms = 0; ms < 600; ms++) {
-        the_panel.pot_q15 = (int16_t)((uint16_t)((500u + (uint16_t)(ms & 1)) << 6) ^ 0x8000u);
+        the_pot.now_q15 = (int16_t)((uint16_t)((500u + (uint16_t)(ms & 1)) << 6) ^ 0x8000u);
         panel_ms(1);
         before = (ms <= 100) ? drive.command.target_erpm : before; /* settled */
         TEST_ASSERT_EQUAL_INT16(before, drive.command.target_erpm);
@@ -240,11 +240,11 @@ void test_pot_is_held_within_half_a_converter_step(void)
 {
     static const int16_t cases[][2] = { { 32, 1000 }, { -32, 1000 }, { 33, 1033 }, { -33, 967 } };
     EACH(n, cases) {
-        the_panel.pot_used_q15 = 1000;
-        the_panel.pot_q15 = (int16_t)(1000 + cases[n][0]);
-        the_panel.pot_q31 = (int32_t)the_panel.pot_q15 * 65536; /* the filter has settled */
+        the_pot.used_q15 = 1000;
+        the_pot.now_q15 = (int16_t)(1000 + cases[n][0]);
+        the_pot.smooth_q31 = (int32_t)the_pot.now_q15 * 65536; /* the filter has settled */
         panel_ms(400);
-        TEST_ASSERT_INT16_WITHIN(cases[n][1] != 1000, cases[n][1], the_panel.pot_used_q15);
+        TEST_ASSERT_INT16_WITHIN(cases[n][1] != 1000, cases[n][1], the_pot.used_q15);
     }
 }
 
@@ -335,15 +335,15 @@ void test_signal_in_the_outer_half_of_a_dead_end_is_a_broken_wire_after_100_ms(v
         float share;
         uint16_t ms; /* until the fault, 0: never */
     } cases[] = { { 0.0F, 100 }, { 0.049F, 100 }, { 0.051F, 0 }, { 0.5F, 0 }, { 0.949F, 0 }, { 0.951F, 100 }, { 1.0F, 100 } };
-    static const panel_inputs_t nothing = { 0, 0, 1 };
+    static const buttons_t nothing = { 0, 0, 1 };
     drive_params_t with = dead_ends();
     EACH(n, cases) {
         uint16_t ms;
         panel_reset();
         rig_ready();
-        the_panel.pot_q15 = (int16_t)((cases[n].share - 0.5F) * 65535.0F);
+        the_pot.now_q15 = (int16_t)((cases[n].share - 0.5F) * 65535.0F);
         for (ms = 1; ms < 1000u; ms++) {
-            (void)panel_tick(&the_panel, &drive, &with, &nothing);
+            panel_pass(&with, &nothing);
             TEST_ASSERT_EQUAL_UINT16_MESSAGE((cases[n].ms != 0u && ms >= cases[n].ms) ? FAULT_POTENTIOMETER : FAULT_NONE, drive.fault, golden_row(n));
         }
         drive.fault = (uint16_t)FAULT_NONE;
@@ -352,32 +352,34 @@ void test_signal_in_the_outer_half_of_a_dead_end_is_a_broken_wire_after_100_ms(v
 
 void test_without_dead_ends_no_position_is_a_fault(void)
 {
-    static const panel_inputs_t nothing = { 0, 0, 500 };
+    static const buttons_t nothing = { 0, 0, 500 };
     TEST_ASSERT_EQUAL_UINT16(0, params.pot_zero_q16); /* the MCLV's potentiometer reaches both rails */
-    the_panel.pot_q15 = INT16_MIN;
-    (void)panel_tick(&the_panel, &drive, &params, &nothing);
-    the_panel.pot_q15 = INT16_MAX;
-    (void)panel_tick(&the_panel, &drive, &params, &nothing);
+    the_pot.now_q15 = INT16_MIN;
+    panel_pass(&params, &nothing);
+    the_pot.now_q15 = INT16_MAX;
+    panel_pass(&params, &nothing);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }
 
 /* ---- wishes that nobody had ---- */
 
-void test_a_flipped_bit_of_a_wish_shows_until_the_panel_is_set_up_anew_and_a_wish_does_not(void)
+void test_a_flipped_bit_of_the_wish_or_of_the_range_shows_and_a_wish_does_not(void)
 {
     uint16_t bit;
     for (bit = 0; bit < 64u; bit++) {
-        int16_t *word = (bit & 16u) ? &the_panel.fast_range : &the_panel.wish_run;
+        const uint16_t is_range = (uint16_t)(bit & 16u);
+        int16_t *word = is_range ? &the_panel.fast_range : &the_request.wish_run;
         panel_reset();
         rig_ready();
         if (bit >= 32u) {
             press_s2(100);
             press_s3(100);
-            TEST_ASSERT_TRUE(the_panel.wish_run == 1 && the_panel.fast_range == 1);
+            TEST_ASSERT_TRUE(the_request.wish_run == 1 && the_panel.fast_range == 1);
         }
-        TEST_ASSERT_EQUAL_UINT16(1, panel_holds(&the_panel));
+        TEST_ASSERT_EQUAL_UINT16(1, request_holds(&the_request));
         *word = (int16_t)(*word ^ (int16_t)(1u << (bit & 15u)));
         panel_ms(2);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(0, panel_holds(&the_panel), golden_row(bit));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(is_range ? 1 : 0, request_holds(&the_request), golden_row(bit));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(is_range ? FAULT_APPLICATION : FAULT_NONE, drive.fault, golden_row(bit));
     }
 }

@@ -10,7 +10,7 @@
 #include <string.h>
 
 drive_t board_drive;
-panel_t board_panel;
+request_t board_request;
 const drive_params_t board_params;
 retry_t board_retry;
 tLimitParm LimitParm;

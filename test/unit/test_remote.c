@@ -10,7 +10,7 @@
 #include "law.c"
 #include "panel_rig.h"
 
-#include "drive/panel.h"
+#include "drive/request.h"
 
 static remote_t command;
 
@@ -46,7 +46,7 @@ void setUp(void)
     rig_ready();
     panel_reset();
     remote_init(&command);
-    inputs.remote = &command;
+    the_client = &command;
     panel_turn_pot(512);
 }
 
@@ -61,7 +61,7 @@ void test_without_a_client_the_panel_is_in_command(void)
     press_s2(40);
     panel_and_drive_ms(5);
     TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
-    TEST_ASSERT_TRUE(panel_holds(&the_panel));
+    TEST_ASSERT_TRUE(request_holds(&the_request));
 }
 
 void test_a_client_starts_sets_the_target_and_stops(void)
@@ -74,11 +74,11 @@ void test_a_client_starts_sets_the_target_and_stops(void)
     command.target_erpm = 7000;
     attended_ms(1);
     TEST_ASSERT_EQUAL_INT16(7000, drive.command.target_erpm);
-    TEST_ASSERT_TRUE(panel_holds(&the_panel));
+    TEST_ASSERT_TRUE(request_holds(&the_request));
     command.run = 0;
     attended_ms(2);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
-    TEST_ASSERT_TRUE(panel_holds(&the_panel));
+    TEST_ASSERT_TRUE(request_holds(&the_request));
 }
 
 void test_the_target_stays_between_minimum_and_maximum_in_either_direction(void)
@@ -125,7 +125,7 @@ void test_when_the_client_vanishes_its_run_ends_in_order_and_the_panel_is_in_com
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
     TEST_ASSERT_EQUAL_INT16(of_pot, drive.command.target_erpm);
     TEST_ASSERT_EQUAL_UINT16(REMOTE_PANEL, command.mode);
-    TEST_ASSERT_TRUE(panel_holds(&the_panel));
+    TEST_ASSERT_TRUE(request_holds(&the_request));
     command.lease_ms = 100; /* alone it brings nothing back */
     panel_and_drive_ms(20);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);
@@ -197,9 +197,9 @@ void test_a_longer_lease_is_cut_to_that_at_once(void)
 void test_a_lease_counts_the_time_that_a_pass_has_taken(void)
 {
     client(REMOTE_TARGET, 0, 6000);
-    remote_tick(&command, &the_panel, &drive, 30);
+    remote_tick(&command, &the_request, &drive, 30);
     TEST_ASSERT_EQUAL_UINT16(70, command.lease_ms);
-    remote_tick(&command, &the_panel, &drive, 70);
+    remote_tick(&command, &the_request, &drive, 70);
     TEST_ASSERT_EQUAL_UINT16(REMOTE_PANEL, command.mode);
 }
 
@@ -207,15 +207,15 @@ void test_a_lease_counts_the_time_that_a_pass_has_taken(void)
 void test_a_client_that_stops_or_clears_in_a_fault_forgets_the_run_that_it_has_ended(void)
 {
     stall_of_a_run(2);
-    TEST_ASSERT_EQUAL_INT16(1, the_panel.interrupted);
+    TEST_ASSERT_EQUAL_INT16(1, the_request.interrupted);
     command.run = 0;
     attended_ms(1);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.interrupted);
-    the_panel.interrupted = 1;
+    TEST_ASSERT_EQUAL_INT16(0, the_request.interrupted);
+    the_request.interrupted = 1;
     command.run = 1;
     command.clear_fault = 1;
     attended_ms(1);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.interrupted);
+    TEST_ASSERT_EQUAL_INT16(0, the_request.interrupted);
 }
 
 void test_an_unknown_mode_is_the_panels(void)
@@ -239,18 +239,18 @@ void test_s2_takes_the_command_and_stops(void)
     TEST_ASSERT_EQUAL_UINT16(REMOTE_PANEL, command.mode);
     client(REMOTE_TARGET, 1, 6000); /* the client may come back, but its old wish starts nothing */
     attended_ms(20);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
+    TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
     command.run = 0;
     attended_ms(2);
     command.run = 1;
     attended_ms(2);
-    TEST_ASSERT_EQUAL_INT16(1, the_panel.wish_run);
+    TEST_ASSERT_EQUAL_INT16(1, the_request.wish_run);
 }
 
 void test_a_fault_ends_the_run_and_needs_a_clear_and_a_new_start(void)
 {
     stall_of_a_run(5);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
+    TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
     TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, drive.fault);
     command.clear_fault = 1;
     attended_ms(5);
@@ -271,8 +271,8 @@ void test_a_start_in_a_fault_is_no_start(void)
     drive_raise(&drive, FAULT_STALL);
     client(REMOTE_TARGET, 1, 6000);
     attended_ms(5);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.interrupted);
+    TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
+    TEST_ASSERT_EQUAL_INT16(0, the_request.interrupted);
     command.clear_fault = 1;
     attended_ms(100);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.run);

@@ -23,7 +23,7 @@ static void all_ms(uint32_t ms)
     while (ms-- != 0u) {
         rig_tick(20);
         panel_ms(1);
-        retry_tick(&retry, &the_panel, &drive, 1);
+        retry_tick(&retry, &the_request, &drive, 1);
     }
 }
 
@@ -158,13 +158,13 @@ void test_s2_in_every_millisecond_around_the_pause_s_end_leaves_the_motor_standi
     for (ms = 1965; ms < 1972u; ms++) { /* the press acts after 30 ms: in the last ones of the pause, and with the fault cleared */
         setUp();
         drive.calibration.done = 0; /* the fault has interrupted the calibration: it takes its time before the start */
-        the_panel.wish_run = 1;
+        the_request.wish_run = 1;
         fault(FAULT_OVERVOLTAGE);
         all_ms(ms);
         press();
         all_ms(5000);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_STOPPED, drive.state);
-        TEST_ASSERT_EQUAL_INT16(0, the_panel.wish_run);
+        TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
     }
 }
 
@@ -218,14 +218,14 @@ void test_the_time_without_a_fault_gives_the_retries_back_in_closed_loop_only(vo
     run();
     fault(FAULT_STALL);
     (void)ms_to_restart(5000);
-    retry_tick(&retry, &the_panel, &drive, 20000); /* the start is no proof */
+    retry_tick(&retry, &the_request, &drive, 20000); /* the start is no proof */
     TEST_ASSERT_EQUAL_UINT16(2, retry.left);
     drive.state = (uint16_t)DRIVE_CLOSED;
     for (ms = 0; ms < 9999u; ms++) {
-        retry_tick(&retry, &the_panel, &drive, 1);
+        retry_tick(&retry, &the_request, &drive, 1);
     }
     TEST_ASSERT_EQUAL_UINT16(2, retry.left);
-    retry_tick(&retry, &the_panel, &drive, 1);
+    retry_tick(&retry, &the_request, &drive, 1);
     TEST_ASSERT_EQUAL_UINT16(3, retry.left);
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, retry.first);
 }
@@ -234,11 +234,11 @@ void test_a_fault_begins_the_time_without_one_anew(void)
 {
     run();
     drive.state = (uint16_t)DRIVE_CLOSED;
-    retry_tick(&retry, &the_panel, &drive, 9000);
+    retry_tick(&retry, &the_request, &drive, 9000);
     fault(FAULT_STALL);
     TEST_ASSERT_TRUE(ms_to_restart(5000) > 1990u); /* nor does it shorten the pause */
     drive.state = (uint16_t)DRIVE_CLOSED;
-    retry_tick(&retry, &the_panel, &drive, 9000);
+    retry_tick(&retry, &the_request, &drive, 9000);
     TEST_ASSERT_EQUAL_UINT16(2, retry.left);
 }
 

@@ -8,7 +8,7 @@ static void all_ms(uint32_t ms)
     while (ms-- != 0u) {
         rig_tick(20);
         panel_ms(1);
-        retry_tick(&retry, &the_panel, &drive, 1);
+        retry_tick(&retry, &the_request, &drive, 1);
     }
 }
 
@@ -18,7 +18,7 @@ void test_never_means_never(void)
     panel_reset();
     rig_ready();
     retry_init(&retry);
-    the_panel.wish_run = 1;
+    the_request.wish_run = 1;
     all_ms(30);
     drive_raise(&drive, FAULT_STALL);
     all_ms(60000);

@@ -10,6 +10,8 @@ static uint16_t stuck_bits;
 #define SELFTEST_WRITE(cell, value) (*(cell) = (uint16_t)(((cell) == stuck_word) ? (value) | stuck_bits : (value)))
 
 #include "firmware/board/peripherals.c"
+#include "firmware/app/panel.c"
+#include "firmware/board/application.c"
 #include "firmware/board/firmware.c"
 #include "firmware/board/isr.c"
 #include "firmware/board/reset.c"
@@ -271,13 +273,13 @@ void test_a_changed_bit_of_the_state_stops_within_a_millisecond(void)
     }
 }
 
-void test_a_changed_bit_of_the_user_s_wishes_stops_within_a_millisecond(void)
+void test_a_changed_bit_of_the_wish_to_run_stops_within_a_millisecond(void)
 {
     for (uint16_t bit = 0; bit < 16u; bit++) {
         setUp();
         board_ms(60);
-        board_panel.fast_range ^= (int16_t)(1u << bit);
-        finds(SELFTEST_VARIABLES, 2, "fast range");
+        board_request.wish_run ^= (int16_t)(1u << bit);
+        finds(SELFTEST_VARIABLES, 2, "wish to run");
     }
 }
 
@@ -360,10 +362,10 @@ void test_the_panel_never_sees_the_converters_test(void)
 {
     uint16_t n, tested = 0;
     for (n = 0; n < 2000u; n++) {
-        int16_t before = board_panel.pot_used_q15;
+        int16_t before = board_pot.used_q15;
         board_ms(1);
         tested |= (uint16_t)(AD1CHS0 != BOARD_AD1CHS0);
-        TEST_ASSERT_TRUE(n < 300u || board_panel.pot_used_q15 == before);
+        TEST_ASSERT_TRUE(n < 300u || board_pot.used_q15 == before);
     }
     TEST_ASSERT_EQUAL_UINT16(1, tested);
 }

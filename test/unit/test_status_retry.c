@@ -14,7 +14,7 @@
 #include "unity.h"
 
 drive_t board_drive;
-panel_t board_panel;
+request_t board_request;
 const drive_params_t board_params;
 volatile uint16_t board_reset_cause;
 uint16_t board_selftest_parts;

@@ -11,7 +11,7 @@
 #include "transmitter.h"
 
 drive_t board_drive;
-panel_t board_panel;
+request_t board_request;
 const drive_params_t board_params;
 retry_t board_retry;
 uint16_t board_selftest_parts;

@@ -7,7 +7,7 @@
 #include "panel_rig.h"
 
 #include "drive/limits.h"
-#include "drive/panel.h"
+#include "drive/request.h"
 
 void setUp(void)
 {
@@ -53,9 +53,9 @@ void test_a_start_that_asks_for_no_current_turns_forwards(void)
     small.current_max_q13 = 1000; /* half a step of the potentiometer's converter is less than a count */
     panel_turn_pot(0);
     drive_set_direction(&drive, -1); /* of the run before */
-    the_panel.wish_run = 1;
+    the_request.wish_run = 1;
     inputs.elapsed_ms = 1;
-    the_lights = panel_tick(&the_panel, &drive, &small, &inputs);
+    panel_pass(&small, &inputs);
     TEST_ASSERT_EQUAL_INT16(0, drive.command.target_erpm);
     TEST_ASSERT_EQUAL_INT16(1, drive.command.run);
     TEST_ASSERT_EQUAL_INT16(1, drive.direction);

@@ -8,7 +8,7 @@
 #include "unity.h"
 
 drive_t board_drive;
-panel_t board_panel;
+request_t board_request;
 static const drive_params_t fresh = DRIVE_PARAMS_INIT;
 drive_params_t board_params = DRIVE_PARAMS_INIT;
 retry_t board_retry;

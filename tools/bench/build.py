@@ -3,19 +3,42 @@
 import os
 import re
 import subprocess
+import zlib
 from pathlib import Path
 
 from tools.common import paths
-from tools.common.errors import UserError, UserErrors
+from tools.common.errors import UserError, UserErrors, suggestion
 from tools.common.progress import waiting
 
 HEADER = "userparams.h"
+APP = "APP="
+"""Begins the entry of a list of macros that names the application: one of firmware/app, or a path."""
 
 
 def variant_name(defines: list[str], userparams: Path | None = None) -> str:
     """Folder suffix for a header and a set of defines; "" for the default build."""
-    macros = re.sub(r"[^a-z0-9]+", "-", "-".join(sorted(defines)).lower()).strip("-")
+    names = [_app_name(define.removeprefix(APP)) if define.startswith(APP) else define for define in sorted(defines)]
+    macros = re.sub(r"[^a-z0-9]+", "-", "-".join(names).lower()).strip("-")
     return "-".join(part for part in ("" if userparams is None else _header_name(userparams), macros) if part)
+
+
+def app(text: str, where: str, beside: Path | None = None) -> str:
+    """The entry for an application: a name of firmware/app, or a file, also one beside the file that names it."""
+    if (paths.ROOT / "firmware" / "app" / f"{text}.c").is_file():
+        return APP + text
+    for path in (Path(text), *([beside.parent / text] if beside else [])):
+        if path.is_file():
+            return APP + str(path.resolve())
+    raise UserError(f"no application '{text}'", where, suggestion(text, sorted(path.stem for path in (paths.ROOT / "firmware" / "app").glob("*.c"))))
+
+
+def _app_name(text: str) -> str:
+    path = Path(text)
+    return f"app-{path.stem}" + (f"-{zlib.crc32(text.encode()):08x}" if path.suffix else "")
+
+
+def _app_path(text: str) -> str:
+    return str(paths.shown(Path(text))) if Path(text).suffix else text
 
 
 def _header_name(folder: Path) -> str:
@@ -51,7 +74,8 @@ def make(target: str, defines: list[str], userparams: Path | None, sanitized: bo
     variant = variant_name(defines, userparams)
     command = ["make", "-s", "-C", str(paths.ROOT), target]
     if variant:
-        command += [f"VARIANT={variant}", "DEFINES=" + " ".join(f"-D{define}" for define in defines)]
+        command += [f"VARIANT={variant}", "DEFINES=" + " ".join(f"-D{define}" for define in defines if not define.startswith(APP))]
+        command += [APP + _app_path(define.removeprefix(APP)).replace("$", "$$") for define in defines if define.startswith(APP)]
     if userparams is not None:
         command.append(f"USERPARAMS={paths.shown(userparams)}".replace("$", "$$"))
     if sanitized:

@@ -51,6 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     for command in (run, prepare):
         command.add_argument("scenario", nargs="?", help="name (see `scenarios`) or TOML file; default demo, rated with --motor")
         command.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
+        command.add_argument("--app", default="", metavar="NAME", help="with this application: a name of firmware/app, or a C file")
     command_common.add_options(run, "SCENARIO")
     command_common.add_options(prepare, "", without=("library", "out", "quiet"))
     for kind in (*SWEEPS, Campaign, Soak):

@@ -87,6 +87,9 @@ def scenario_for(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
         name = next((item.name for item in fitting if item.name.upper() in asked), fitting[0].name)
     item = scenario_file.load(name or ("rated" if options.motor else "demo"))
     more = [define for define in defines if define not in item.defines]
+    if getattr(options, "app", ""):
+        more.append(build.app(options.app, "APP"))
+        item.defines = [define for define in item.defines if not define.startswith(build.APP)]
     item.defines += more
     return item, more
 

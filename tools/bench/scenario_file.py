@@ -8,6 +8,7 @@ from tools.common import param_rows, paths
 from tools.common.board_keys import Values
 from tools.common.errors import suggestion
 from tools.common.toml_file import REQUIRED, Document, Section
+from . import build
 from .expect import read_expectations
 from .metrics import SPEEDS, Measure
 from .panel import HOLD_S
@@ -71,6 +72,8 @@ def _read_firmware(section: Section | None, scenario: Scenario) -> None:
         name, _, value = define.partition("=")
         if not name.isidentifier() or not all(c.isalnum() or c in "+-._" for c in value):
             raise section.fail("defines", f"'{define}' is no macro", "write \"NAME\" or \"NAME=value\"")
+    if named := section.text("app", "", "application: a name of firmware/app, or a path"):
+        scenario.defines.append(build.app(named, section.where("app"), section.document.path))
     section.close()
 
 

@@ -37,7 +37,7 @@ target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 target_unit = $(call includes_of,$(firmware_sources))
 
 .PHONY: firmware image flash project find-xc16
-firmware: find-xc16 ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS=]
+firmware: find-xc16 ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS= APP=name]
 	$(call build,$X/checked)
 	@cat $X/checked
 
@@ -78,7 +78,10 @@ $X/image.c: FORCE | target-input
 $X/params: $X/flags $(params_source) $(params_tools)
 	$(params) $(target_compile)
 
-$X/image.o: $X/image.c $X/flags | $X/params
+$X/app.checked: $(app_source) $X/flags tools/make/app.sh $(wildcard include/app/*.h) | $X/params
+	@tools/make/app.sh $@ $< $(call quoted,$(app_shown)) $(xc16)nm $(target_compile)
+
+$X/image.o: $X/image.c $X/flags $(app_source) | $X/params $X/app.checked
 	$(call say,xc16,$<)$(target_compile) $(target_whole) -MMD -MP -c $< -o $@
 
 # Each file on its own, for the unit tests on the target (tools/make/test-target.mk).

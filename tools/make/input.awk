@@ -7,7 +7,7 @@
 BEGIN {
     names("V INSTALL FOC33_QUIET CC PYTHON RUBY SHELL MAKE MAKEFLAGS GNUMAKEFLAGS XC16 DFP", everywhere)
     names("lib vboard bench iss examples test test-quick test-sweeps test-release test-target firmware flash size", compiles)
-    names("VARIANT SAN DEFINES USERPARAMS WERROR OPT CFLAGS warnings sanitizer", compilation)
+    names("VARIANT SAN DEFINES USERPARAMS APP WERROR OPT CFLAGS warnings sanitizer", compilation)
 }
 
 /^[a-z0-9-]+:.*## \[/ {

@@ -1,6 +1,7 @@
 /* The seam between the board and the modes: lines, watch variables, arrays and memory of theirs. */
 #include "board/modes/mode_board.h"
 
+#include "board/application.h"
 #include "board/firmware.h"
 #include "board/mclv.h"
 #include "board/pin_table.h"
@@ -282,11 +283,16 @@ void mode_panel_init(void)
 #endif
 }
 
-panel_lights_t mode_panel(const panel_inputs_t *in)
+uint16_t mode_panel(uint16_t elapsed_ms)
 {
 #ifdef BRINGUP
-    return bringup_pass(&board_bringup, &board_drive, &board_params, in, board_panel.pot_q15);
+    const buttons_t in = { BOARD_S2_DOWN(), BOARD_S3_DOWN(), elapsed_ms };
+    const lights_t lights = bringup_pass(&board_bringup, &board_drive, &board_params, &in, board_pot.now_q15);
+    BOARD_SWITCH(BOARD_LED_ALIVE, lights.led_alive);
+    BOARD_SWITCH(BOARD_LED_RUN, lights.led_run);
+    return 1;
 #else
-    return panel_tick(&board_panel, &board_drive, &board_params, in);
+    (void)elapsed_ms;
+    return 0;
 #endif
 }

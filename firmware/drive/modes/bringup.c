@@ -285,7 +285,7 @@ static void step_with_current(bringup_guide_t *g, drive_t *d, const drive_params
     }
 }
 
-static void take_step(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const panel_inputs_t *in, int16_t pot_q15)
+static void take_step(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const buttons_t *in, int16_t pot_q15)
 {
     switch (g->step) {
     case BRINGUP_STEP_BEGIN: bringup_step_begin(g, in); break;
@@ -311,7 +311,7 @@ static void take_step(bringup_guide_t *g, drive_t *d, const drive_params_t *p, c
 }
 
 /** The button that has been pressed, by the name on it. */
-static void read_buttons(bringup_guide_t *g, const panel_inputs_t *in)
+static void read_buttons(bringup_guide_t *g, const buttons_t *in)
 {
     uint16_t s2 = button_pressed(&g->s2, in->s2_down, in->elapsed_ms), s3 = button_pressed(&g->s3, in->s3_down, in->elapsed_ms);
     if (s2 || s3) {
@@ -319,9 +319,9 @@ static void read_buttons(bringup_guide_t *g, const panel_inputs_t *in)
     }
 }
 
-panel_lights_t bringup_pass(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const panel_inputs_t *in, int16_t pot_q15)
+lights_t bringup_pass(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const buttons_t *in, int16_t pot_q15)
 {
-    panel_lights_t lights;
+    lights_t lights;
     read_buttons(g, in);
     g->waited_ms = (uint16_t)((g->waited_ms > UINT16_MAX - in->elapsed_ms) ? UINT16_MAX : g->waited_ms + in->elapsed_ms);
     if (drive_is_running(d) && g->asked && g->waited_ms >= CURRENT_MS) {

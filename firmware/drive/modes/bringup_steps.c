@@ -14,7 +14,7 @@ static int16_t pot_percent(int16_t pot_q15)
     return (int16_t)((qm_muluu((uint16_t)((uint16_t)pot_q15 ^ 0x8000u), 100u) + 32768ul) >> 16);
 }
 
-void bringup_step_begin(bringup_guide_t *g, const panel_inputs_t *in)
+void bringup_step_begin(bringup_guide_t *g, const buttons_t *in)
 {
     if (g->phase == 0u) {
         if (in->s2_down || in->s3_down) {

@@ -5,7 +5,7 @@
 #include "drive/drive.h"
 #include "drive/modes/bringup.h"
 #include "drive/modes/mode_table.h"
-#include "drive/panel.h"
+#include "drive/request.h"
 
 #ifdef IDENTIFY
 
@@ -84,13 +84,13 @@ extern snapshot_t board_snapshot;
 /** The mode's part of the slow work. */
 void mode_record(void);
 
-/* ---- Who looks at buttons and potentiometer: the panel, or BRINGUP's guide in its place ---- */
+/* ---- Who looks at buttons and potentiometer: the application, or BRINGUP's guide in its place ---- */
 
-/** After panel_init(). */
+/** After application_init(). */
 void mode_panel_init(void);
 
-/** Buttons and potentiometer to what the drive is asked for. @return the lights */
-panel_lights_t mode_panel(const panel_inputs_t *in);
+/** A pass of the guide in the application's place: buttons, potentiometer, lights. @return 1 where it is */
+uint16_t mode_panel(uint16_t elapsed_ms);
 
 /* ---- The scope's memory: what the chip has left without the fault recorder, less what a mode takes of it ---- */
 

@@ -8,7 +8,7 @@
 
 #include "control/svm.h"
 #include "drive/faults.h"
-#include "drive/panel.h"
+#include "drive/inputs.h"
 
 /** The most current that any step asks for, as a share of MAXIMUM_CURRENT_A. Over-current, bus and fault input protect as ever. */
 #define BRINGUP_CURRENT_SHARE 0.3
@@ -270,8 +270,8 @@ typedef struct {
 /** Begins anew. */
 void bringup_init(bringup_guide_t *g);
 
-/** A pass of the background, in place of panel_tick(). @param pot_q15 signed fractional */
-panel_lights_t bringup_pass(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const panel_inputs_t *in, int16_t pot_q15);
+/** A pass of the background, in place of application_tick(). @param pot_q15 signed fractional */
+lights_t bringup_pass(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const buttons_t *in, int16_t pot_q15);
 
 /** A line without a value. */
 void bringup_say(bringup_guide_t *g, bringup_kind_t kind, uint16_t code, uint16_t part);

@@ -6,7 +6,7 @@
 
 #ifdef BRINGUP
 /** Says by which pin of the serial line it speaks, by one and the other in turn, until a button comes. */
-void bringup_step_begin(bringup_guide_t *g, const panel_inputs_t *in);
+void bringup_step_begin(bringup_guide_t *g, const buttons_t *in);
 
 /** The other button: S3, unless both have changed places. */
 void bringup_step_s3(bringup_guide_t *g);

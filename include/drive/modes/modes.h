@@ -18,7 +18,7 @@
  * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over
  * MODE_PARAMS_PLACE     PARAMS_IN_RAM, TUNING  where the parameters are
  *
- * SNAPSHOT is called by the board, which owns its arrays. With BRINGUP the board calls bringup_pass() in place of panel_tick(). */
+ * SNAPSHOT is called by the board, which owns its arrays. With BRINGUP the board calls bringup_pass() in place of application_tick(). */
 #ifndef DRIVE_MODES_MODES_H
 #define DRIVE_MODES_MODES_H
 

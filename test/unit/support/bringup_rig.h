@@ -6,7 +6,7 @@
 
 #include "drive/modes/bringup.h"
 
-#define PRESS_MS (PANEL_DEBOUNCE_MS + 5u)
+#define PRESS_MS (BUTTON_DEBOUNCE_MS + 5u)
 
 static bringup_guide_t guide;
 static int16_t pot, pot_ends[2]; /* where it stands; left, right */
@@ -23,7 +23,7 @@ static uint16_t answers[BRINGUP_QUESTIONS];
 /** Power-up, a right board, the right answers. */
 static inline void bringup_reset(void)
 {
-    static const panel_inputs_t nothing;
+    static const buttons_t nothing;
     uint16_t n;
     bringup_init(&guide);
     inputs = nothing;

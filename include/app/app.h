@@ -1,0 +1,86 @@
+/* The application: what decides when the motor runs and how fast. One file of this room is in the build; APP=path names another one.
+ *
+ *     void app_init(void);                                            once, before anything moves
+ *     void app_ms(const app_told_t *told, app_asks_t *asks);          every millisecond, in the background
+ *
+ * It is told what the drive does and asks the drive; it reaches nothing else, and the build refuses one that does. A call that takes longer than
+ * APP_LATE_MS stops the motor in order, and is the fault APPLICATION. docs/application.md leads through it.
+ *
+ * Quantities are counts, and these make counts of units at no cost: APP_RPM(1500), APP_AMPERE(0.5), APP_VOLT(20). */
+#ifndef APP_APP_H
+#define APP_APP_H
+
+#include "drive/faults.h"
+#include "drive/inputs.h"
+#include "drive/scaling/current_voltage.h"
+#include "drive/states.h"
+
+#define APP_LATE_MS 20 /* a call that takes longer is late, [ms] */
+
+/** Counts of a speed, current or voltage that is a constant. A speed is electrical rpm in counts of SPEED_UNIT, a current full scale / 8192. */
+#define APP_RPM(rpm) ((int16_t)PARAM_ROUND(PARAM_F(rpm) * PARAM_F(NOPOLESPAIRS) / PARAM_F(SPEED_UNIT)))
+#define APP_AMPERE(ampere) ((int16_t)CURRENT_Q13(ampere))
+#define APP_VOLT(volt) ((int16_t)(PARAM_F(volt) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F))
+/** Counts of a share, 0..1: of the potentiometer's travel. */
+#define APP_SHARE(share) ((uint16_t)(PARAM_F(share) * 65535.0F))
+
+/** Counts of a speed that is not known before: times pole pairs, over SPEED_UNIT. @param rpm shaft, within the range of a word when multiplied */
+QM_INLINE int16_t app_rpm(int16_t rpm)
+{
+    return (int16_t)(rpm * NOPOLESPAIRS / SPEED_UNIT);
+}
+
+/** Bits of app_told_t.inputs: on while the pin is on, as its row of the board file says. */
+enum {
+    APP_S2 = 1, /**< button S2 is down */
+    APP_S3 = 2  /**< button S3 is down */
+};
+
+/** Bits of app_asks_t.outputs. */
+enum {
+    APP_LED_ALIVE = 1, /**< lights LED ALIVE */
+    APP_LED_RUN = 2    /**< lights LED RUN */
+};
+
+/** Lowest and highest of a range. */
+typedef struct {
+    int16_t low, high;
+} app_range_t;
+
+/** What the application is told. */
+typedef struct {
+    uint16_t elapsed_ms;  /**< since the last call; 1 as a rule */
+    uint16_t state;       /**< drive_state_t */
+    uint16_t fault;       /**< drive_fault_t; FAULT_NONE is 0 */
+    uint16_t limits;      /**< bits of limit_reason_t: why the drive gives less than it is asked for */
+    uint16_t is_running;  /**< 1 while the bridge conducts */
+    uint16_t is_remote;   /**< 1 while a client of the serial line is in command: what is asked for waits */
+    int16_t speed;        /**< estimated speed, counts of APP_RPM(); 0 while the bridge is off */
+    int16_t reference;    /**< the speed reference on its ramp */
+    int16_t iq_q13;       /**< q current, counts of APP_AMPERE(): the torque */
+    int16_t bus_q15;      /**< supply, counts of APP_VOLT() */
+    uint16_t inputs;      /**< bits APP_S2, ... */
+    uint16_t pot_q16;     /**< potentiometer's share of its travel, smoothed, APP_SHARE(); in BIDIRECTIONAL_SPEED from its middle */
+    int16_t towards;      /**< 1 or -1: the direction of the potentiometer's side in BIDIRECTIONAL_SPEED, else 1 */
+    uint16_t pot_is_lost; /**< 1: its signal is where no position is, POT_LIVE_ZERO */
+    app_range_t slow;     /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
+    app_range_t fast;     /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */
+} app_told_t;
+
+/** What it asks for. Before the call it holds what stands; what the application does not change stays. */
+typedef struct {
+    int16_t run;           /**< 1: run. From 0 to 1 without a fault starts; 0 stops in order. 0 after a fault, but for one that the retry will clear */
+    int16_t target;        /**< speed, its sign the direction, counts of APP_RPM(); TORQUE_MODE: q current, counts of APP_AMPERE() */
+    uint16_t clear_fault;  /**< 1: clear the fault, once */
+    uint16_t fault;        /**< a fault of the application's own: FAULT_POTENTIOMETER for a lost command signal, any other is FAULT_APPLICATION */
+    uint16_t take_command; /**< 1: take command back from a client of the serial line */
+    uint16_t outputs;      /**< bits APP_LED_ALIVE, ... */
+} app_asks_t;
+
+/** Once after a reset, before the outputs are on: the application's own variables begin anew. */
+void app_init(void);
+
+/** Every millisecond in the background. It must return at once: no waiting, no loop without end. */
+void app_ms(const app_told_t *told, app_asks_t *asks);
+
+#endif

@@ -1,0 +1,54 @@
+/* What is wished of the drive: by the application, or by a client of the serial line in its place; the retry wishes again what a fault has ended. */
+#ifndef DRIVE_REQUEST_H
+#define DRIVE_REQUEST_H
+
+#include "drive/remote.h"
+
+/** What the application asks for in a pass. */
+typedef struct {
+    int16_t run;           /**< 1: run; 0: stop in order */
+    int16_t target;        /**< speed target, signed, electrical rpm (counts of SPEED_UNIT of them); TORQUE_MODE: q current, Q13 */
+    uint16_t clear_fault;  /**< 1: one request */
+    uint16_t take_command; /**< 1: from a client of the serial line */
+    uint16_t elapsed_ms;   /**< since the last pass, 1 or more */
+    REMOTE_INPUT
+} asked_t;
+
+/** What is wished. */
+struct request {
+    int16_t wish_run;    /**< the motor is to run */
+    int16_t interrupted; /**< a fault has ended a run that is still wished. For the retry: 0 without */
+    int16_t asked_run;   /**< what the application asked for a pass before */
+    uint16_t kept;       /**< complement of wish_run: a flipped bit would start the motor */
+};
+
+/** Nothing is wished. */
+void request_init(request_t *request);
+
+/** 1 if the wish is as it was written. The self-test of VARIABLES asks. */
+uint16_t request_holds(const request_t *request);
+
+/** 1 while a run is wished, also one that a fault has ended and the retry will begin again. */
+int16_t request_stands(const request_t *request);
+
+/** A pass of the background: what is asked becomes the drive's command. A start is a change of run from 0 to 1 without a fault. */
+void request_tick(request_t *request, drive_t *d, const drive_params_t *p, const asked_t *asked);
+
+/* ---- the retry: a run that a passing fault has ended starts again by itself, after a pause and a stated number of times ---- */
+
+/** State of the retry. */
+typedef struct {
+    uint16_t left;      /**< retries left before a fault stays */
+    uint16_t first;     /**< drive_fault_t that began it; FAULT_NONE: nothing to tell */
+    uint16_t fault;     /**< the one that the pause is for */
+    uint16_t asked;     /**< 1: the fault has been asked to go */
+    uint32_t waited_ms; /**< in the pause, or in closed loop since the last fault */
+} retry_t;
+
+/** All retries left. */
+void retry_init(retry_t *r);
+
+/** A pass of the background, after request_tick(): it clears a fault and wishes a run again. RETRY_COUNT 0: never. */
+void retry_tick(retry_t *r, request_t *request, drive_t *d, uint16_t elapsed_ms);
+
+#endif

@@ -1,0 +1,24 @@
+#!/bin/sh
+# Refuses an application that reaches into the drive: app.sh STAMP SOURCE SHOWN NM COMPILE... It may include app/ and the compiler's own headers, and
+# call what they declare: names that stay undefined where it is compiled alone must be among these.
+set -e
+stamp=$1 source=$2 shown=$3 nm=$4
+shift 4
+allowed='button_pressed memcpy memset memmove _memcpy _memset _memmove'
+
+first=$(grep -n '^ *# *include' "$source" | grep -vE '"app/[a-z_]+\.h"|<(stdint|stdbool|stddef|limits)\.h>' | head -n 1 || true)
+if [ -n "$first" ]; then
+    echo "foc33: ${first#*:} in $shown: an application sees app/ alone; what it may know and ask is in include/app/app.h" >&2
+    exit 2
+fi
+for hook in app_init app_ms; do
+    grep -qE "^ *void +$hook *\(" "$source" || { echo "foc33: no $hook() in $shown: an application has app_init() and app_ms() (include/app/app.h)" >&2; exit 2; }
+done
+"$@" -c "$source" -o "$stamp.o"
+for name in $($nm -u "$stamp.o" | sed 's/.* //'); do
+    case " $allowed " in
+    *" ${name#_} "*) ;;
+    *) echo "foc33: ${name#_} in $shown: an application reaches nothing but what include/app/app.h has" >&2; exit 2 ;;
+    esac
+done
+: >"$stamp"
