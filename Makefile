@@ -42,18 +42,18 @@ compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFI
 # The virtual board: plant, chip, the board itself, and the processor that is the firmware built for the PC.
 board_rooms := $(addprefix tools/,plant chip vboard cpu_host)
 board_includes := $(board_rooms:%=-I%)
-# One unit of them all, as the image (tools/make/image.mk); the parameters' checks are no code, and a harness may have a loop of its own.
+# One unit of them all but the application, as the image (tools/make/image.mk); the parameters' checks are no code, and a harness may have a loop of its own.
 params_source := firmware/drive/param_text.c firmware/drive/param_check.c
 # The application: a file of firmware/app by its name, or a path to any, which is copied as userparams.h is. APP=panel if none is named.
 app_copy := build/app$(suffix)/app.c
 app_source := $(or $(wildcard firmware/app/$(or $(filter-out .%,$(APP)),panel).c),$(app_copy))
-firmware_sources := $(filter-out $(params_source),$(wildcard firmware/board/*.c firmware/control/*.c firmware/drive/*.c firmware/*/modes/*.c)) $(app_source)
+firmware_sources := $(filter-out $(params_source) firmware/app/%,$(wildcard firmware/*/*.c firmware/*/*/*.c))
 includes_of = $(foreach file,$1,'$(hash)include "$(file)"')
 hash := \#
 unit := $B/unit.o
-firmware_objects := $(unit) $B/firmware/board/main.o $B/tools/cpu_host/xc.o
+firmware_objects := $(unit) $B/app.o $B/firmware/board/main.o $B/tools/cpu_host/xc.o
 # Each file alone, so that a test or a mock may take the place of any.
-part_objects := $(firmware_sources:%.c=$B/%.o) $B/tools/cpu_host/xc.o
+part_objects := $(firmware_sources:%.c=$B/%.o) $B/app.o $B/tools/cpu_host/xc.o
 # All variants share the board but for its view into the firmware, unless they compile in a way of their own.
 own_way := $(SAN)$(WERROR)$(filter command%,$(origin CC) $(origin CFLAGS) $(origin warnings))
 board_folder := $(if $(own_way),$B,build/board)
@@ -286,8 +286,12 @@ $(app_copy): FORCE
 	    { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
 
 app_shown = $(if $(filter $(app_copy),$(app_source)),$(APP),$(app_source))
-$B/app.checked: $(app_source) $B/flags tools/make/app.sh $(wildcard include/app/*.h) | $B/params
-	@tools/make/app.sh $@ $< $(call quoted,$(app_shown)) nm $(compile)
+# A unit of its own: its names are its own, and it links to what app.h has and to nothing else.
+$B/app.from: FORCE
+	$(call remember,$(app_source))
+
+$B/app.o: $(app_source) $B/app.from $B/flags tools/make/app.sh | $B/params
+	$(call say,cc,$(app_shown))tools/make/app.sh $@ $< $(call quoted,$(app_shown)) nm $(compile) -MMD -MP
 
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))
@@ -323,7 +327,7 @@ $B/unit.c: FORCE
 $B/law.c: FORCE
 	$(call remember_lines,$(call includes_of,$(filter firmware/control/% firmware/drive/%,$(firmware_sources))))
 
-$(unit): $B/unit.c $B/flags $(app_source) | $B/params $B/app.checked
+$(unit): $B/unit.c $B/flags | $B/params
 	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
 
 $B/libfirmware.a: $(firmware_objects) $B/contents
@@ -336,8 +340,8 @@ $B/libparts.a: $(part_objects) $B/contents
 
 # The firmware without its loop, its variables in one stretch.
 window_script := tools/cpu_host/window.ld
-$B/firmware.o: $(unit) $B/contents $(window_script)
-	$(call say,ld,$@)$(CC) -r -nostdlib -Wl,-T,$(window_script) -o $@.new $(unit) && mv -f $@.new $@
+$B/firmware.o: $(unit) $B/app.o $B/contents $(window_script)
+	$(call say,ld,$@)$(CC) -r -nostdlib -Wl,-T,$(window_script) -o $@.new $(unit) $B/app.o && mv -f $@.new $@
 
 firmware_library := $(board_objects) $B/firmware.o $B/tools/cpu_host/xc.o
 $B/libvboard.so: $(firmware_library)

@@ -12,8 +12,8 @@ typedef struct {
     uint16_t down_ms; /**< how long it has been down, saturated */
 } button_t;
 
-/** 1 once per press. */
-uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms);
+/** 1 once per press. The application calls it, too. */
+uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms) __attribute__((externally_visible));
 
 /** Buttons of one background pass. */
 typedef struct {

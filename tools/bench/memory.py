@@ -31,10 +31,11 @@ class Variable:
 
 def variables(library: Library) -> list[Variable]:
     """Every writable variable of the firmware that the library was linked from, DRIVE first."""
-    unit = library.path.parent / "unit.o"
-    if not unit.exists():
-        raise UserError("cannot read what the library was linked from", str(paths.shown(unit)), "make vboard")
-    written = {(name, size) for name, size, _ in _symbols(str(unit))}
+    objects = [library.path.parent / name for name in ("unit.o", "app.o")]
+    for each in objects:
+        if not each.exists():
+            raise UserError("cannot read what the library was linked from", str(paths.shown(each)), "make vboard")
+    written = {(name, size) for each in objects for name, size, _ in _symbols(str(each))}
     found = {name: Variable(name, at, size) for name, size, at in _symbols(str(library.path)) if (name, size) in written}
     if DRIVE not in found:
         raise UserError(f"the firmware has no variable '{DRIVE}'", str(paths.shown(library.path)), "rebuild with make vboard")

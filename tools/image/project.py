@@ -29,7 +29,7 @@ LINKER_BOXES = {"--gc-sections": ("remove-unused-sections", "true"), "--report-m
 
 def read(lines: Iterable[str]) -> dict[str, list[str]]:
     """Facts by kind: what is compiled first and by itself, what is in the unit, headers, flags, folders, device."""
-    facts: dict[str, list[str]] = {"first": [], "unit": [], "header": [], "flag": [], "include": [], "link": [], "device": []}
+    facts: dict[str, list[str]] = {"first": [], "unit": [], "app": [], "header": [], "flag": [], "include": [], "link": [], "device": []}
     for line in lines:
         kind, _, value = line.strip().partition(" ")
         if kind not in facts or not value:
@@ -51,7 +51,7 @@ def updated(text: str, facts: dict[str, list[str]]) -> str:
     root.find(".//targetDevice").text = f"dsPIC{facts['device'][0]}"
     _fill(root.find(".//logicalFolder[@name='HeaderFiles']"), {file: "/".join(Path(file).parent.parts[1:]) for file in sorted(facts["header"])})
     compiled = root.find(".//logicalFolder[@name='SourceFiles']")
-    _fill(compiled, {file: FIRST_FOLDER for file in facts["first"]})
+    _fill(compiled, {file: FIRST_FOLDER for file in facts["first"]} | {file: "app" for file in facts["app"]})
     ET.SubElement(compiled, "itemPath").text = UNIT
     _set(root.find(".//C30"), BOXES, facts["flag"], {"extra-include-directories": ";".join(above(path) for path in facts["include"])})
     _set(root.find(".//C30-LD"), LINKER_BOXES, facts["link"], {})

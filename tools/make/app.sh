@@ -1,10 +1,10 @@
 #!/bin/sh
-# Refuses an application that reaches into the drive: app.sh STAMP SOURCE SHOWN NM COMPILE... It may include app/ and the compiler's own headers, and
-# call what they declare: names that stay undefined where it is compiled alone must be among these.
+# Compiles an application, and refuses one that reaches into the drive: app.sh OBJECT SOURCE SHOWN NM COMPILE... It may include app/ and the compiler's
+# own headers, and call what app.h has.
 set -e
-stamp=$1 source=$2 shown=$3 nm=$4
+object=$1 source=$2 shown=$3 nm=$4
 shift 4
-allowed='button_pressed memcpy memset memmove _memcpy _memset _memmove'
+allowed='button_pressed memcpy memset memmove _memcpy _memset _memmove GLOBAL_OFFSET_TABLE_'
 
 first=$(grep -n '^ *# *include' "$source" | grep -vE '"app/[a-z_]+\.h"|<(stdint|stdbool|stddef|limits)\.h>' | head -n 1 || true)
 if [ -n "$first" ]; then
@@ -14,11 +14,10 @@ fi
 for hook in app_init app_ms; do
     grep -qE "^ *void +$hook *\(" "$source" || { echo "foc33: no $hook() in $shown: an application has app_init() and app_ms() (include/app/app.h)" >&2; exit 2; }
 done
-"$@" -c "$source" -o "$stamp.o"
-for name in $($nm -u "$stamp.o" | sed 's/.* //'); do
+"$@" -c "$source" -o "$object"
+for name in $("$nm" -u "$object" | sed 's/.* //'); do
     case " $allowed " in
     *" ${name#_} "*) ;;
-    *) echo "foc33: ${name#_} in $shown: an application reaches nothing but what include/app/app.h has" >&2; exit 2 ;;
+    *) echo "foc33: ${name#_} in $shown: an application reaches nothing but what include/app/app.h has" >&2; rm -f "$object"; exit 2 ;;
     esac
 done
-: >"$stamp"

@@ -78,10 +78,13 @@ $X/image.c: FORCE | target-input
 $X/params: $X/flags $(params_source) $(params_tools)
 	$(params) $(target_compile)
 
-$X/app.checked: $(app_source) $X/flags tools/make/app.sh $(wildcard include/app/*.h) | $X/params
-	@tools/make/app.sh $@ $< $(call quoted,$(app_shown)) $(xc16)nm $(target_compile)
+$X/app.from: FORCE | target-input
+	$(call remember,$(app_source))
 
-$X/image.o: $X/image.c $X/flags $(app_source) | $X/params $X/app.checked
+$X/app.o: $(app_source) $X/app.from $X/flags tools/make/app.sh | $X/params
+	$(call say,xc16,$(app_shown))tools/make/app.sh $@ $< $(call quoted,$(app_shown)) $(xc16)nm $(target_compile) -MMD -MP
+
+$X/image.o: $X/image.c $X/flags | $X/params
 	$(call say,xc16,$<)$(target_compile) $(target_whole) -MMD -MP -c $< -o $@
 
 # Each file on its own, for the unit tests on the target (tools/make/test-target.mk).
@@ -89,8 +92,8 @@ $X/%.o: %.c $X/flags | $X/params
 	@mkdir -p $(@D)
 	$(call say,xc16,$<)$(target_compile) -MMD -MP -c $< -o $@
 
-$X/foc33.elf: $X/image.o tools/image/crc.py
-	$(call say,ld,$@)$(target_link) -o $@ $< -Wl,-Map=$X/foc33.map,$(target_link_options) >$X/foc33.memory 2>&1 || \
+$X/foc33.elf: $X/image.o $X/app.o tools/image/crc.py
+	$(call say,ld,$@)$(target_link) -o $@ $(filter %.o,$^) -Wl,-Map=$X/foc33.map,$(target_link_options) >$X/foc33.memory 2>&1 || \
 	    { reason=$$(grep -iEm 1 'undefined reference|error|could not|cannot|is full|multiple definition' $X/foc33.memory); \
 	    echo "foc33: the image does not link: $${reason#: } (more in $X/foc33.memory)" >&2; rm -f $@; exit 1; }
 	@! grep -i warning $X/foc33.memory >&2 || { rm -f $@; exit 1; }
@@ -118,7 +121,7 @@ flash: firmware ## [your board] program the board by MPLAB IPE's command line, o
 	@$(python) -m tools.image.flash $X/foc33.hex --elf $X/foc33.elf $(if $(TOOL),--tool $(call quoted,$(TOOL))) $(if $(IPE),--ipe $(call quoted,$(IPE)))
 
 # What the MPLAB X project is made of, one item a line: it cannot say anything else than this file does.
-target_facts = $(foreach word,$(filter %.c,$(params_source)),'first $(word)') $(foreach word,$(firmware_sources),'unit $(word)') $(foreach word,$(wildcard include/*.h include/*/*.h include/*/*/*.h) userparams.h,'header $(word)') \
+target_facts = $(foreach word,$(filter %.c,$(params_source)),'first $(word)') $(foreach word,$(firmware_sources),'unit $(word)') 'app firmware/app/panel.c' $(foreach word,$(wildcard include/*.h include/*/*.h include/*/*/*.h) userparams.h,'header $(word)') \
     $(foreach word,$(filter-out -Werror,$(target_flags) $(target_whole) $(target_warnings)),'flag $(word)') \
     $(foreach word,$(patsubst -I%,%,$(target_includes)),'include $(word)') \
     $(foreach word,$(subst $(comma), ,$(target_link_options)),'link $(word)') 'device $(target_device)'
@@ -135,4 +138,4 @@ project: ## [your board] write the MPLAB X project firmware.X
 project-facts:
 	@printf '%s\n' $(target_facts)
 
--include $X/params.d $X/image.d $(firmware_sources:%.c=$X/%.d)
+-include $X/params.d $X/image.d $X/app.d $(firmware_sources:%.c=$X/%.d)
