@@ -14,7 +14,7 @@
 
 pot_t board_pot BOARD_UNSET;
 
-static volatile uint16_t application_runs BOARD_UNSET; /* 1 during the call */
+static volatile uint16_t application_runs BOARD_UNSET;  /* 1 during the call */
 static volatile uint16_t application_since BOARD_UNSET; /* drive ticks when it began */
 
 void application_init(void)

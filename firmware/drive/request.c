@@ -6,7 +6,7 @@
 /** Complement of the wish, in which no bit of it goes unseen. */
 static uint16_t request_complement(const request_t *request)
 {
-    return (uint16_t)~(uint16_t)request->wish_run;
+    return (uint16_t) ~(uint16_t)request->wish_run;
 }
 
 uint16_t request_holds(const request_t *request)

@@ -24,11 +24,8 @@
 /** Counts of a share, 0..1: of the potentiometer's travel. */
 #define APP_SHARE(share) ((uint16_t)(PARAM_F(share) * 65535.0F))
 
-/** Counts of a speed that is not known before: times pole pairs, over SPEED_UNIT. @param rpm shaft, within the range of a word when multiplied */
-QM_INLINE int16_t app_rpm(int16_t rpm)
-{
-    return (int16_t)(rpm * NOPOLESPAIRS / SPEED_UNIT);
-}
+/** The same of a speed that is no constant. @param rpm int16_t; times NOPOLESPAIRS within a word */
+#define APP_OF_RPM(rpm) ((int16_t)((int16_t)((rpm) * (int16_t)NOPOLESPAIRS) / (int16_t)SPEED_UNIT))
 
 /** Bits of app_told_t.inputs: on while the pin is on, as its row of the board file says. */
 enum {

@@ -60,7 +60,7 @@
     X(16, OPEN_PHASE, FAULT_STAYS, "signals_which_is_wrong, signals_phases", \
       "voltages and currents did not fit the motor, and one phase carried much less current than the others; or it carried hardly any of what was asked of it", \
       "check the motor's wires, the transistors of that phase and its current signal") \
-    X(17, POTENTIOMETER, FAULT_STAYS, "pot_is_lost, application_fault", \
+    X(17, POTENTIOMETER, FAULT_STAYS, "panel_tick, application_fault", \
       "the potentiometer's signal was in the dead ends of POT_LIVE_ZERO, where no position of it is", \
       "check its three wires") \
     X(18, INTERRUPT_RATE, FAULT_STAYS, "firmware_count_interrupts", \
@@ -72,8 +72,8 @@
     X(20, SELFTEST, FAULT_STAYS, "selftest_fail, drive_enter", \
       "a self-test failed: memory, processor, clock, program flow or a register is not as it must be", \
       "see board_selftest_failed or the status line for the test, docs/selftest.md for its meaning, then reset: S2 does not clear this one") \
-    X(21, APPLICATION, FAULT_STAYS, "application_watch, application_fault", \
-      "the application did not return within APP_LATE_MS, or found a fault of its own", \
+    X(21, APPLICATION, FAULT_STAYS, "panel_tick, application_watch, application_fault", \
+      "the application did not return within 20 ms, or found a fault of its own", \
       "look in firmware/app, or in the file of APP=, for a loop that waits and for what sets asks->fault")
 
 #define DRIVE_FAULT_ENUM(code, name, passes, decided_by, cause, remedy) FAULT_##name = (code),
