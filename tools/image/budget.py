@@ -142,7 +142,7 @@ class Budget:
         return next((module for module in self.modules if fits(path, module.objects)), self._of_file(file))
 
     def _of_file(self, file: str) -> Module:
-        return next((module for module in self.modules if file in module.files), UNASSIGNED)
+        return next((module for module in self.modules if fits(file, module.files)), UNASSIGNED)
 
     def of_word(self, word: Word) -> tuple[Module, str, tuple[int, ...]]:
         """The module a word is counted with, the function it is shown under, and which copy of that function it is in."""
@@ -169,7 +169,7 @@ class Budget:
         lines, seen = [], set()
         for name in self.names:
             if name.kind == "file":
-                found = (root / name.text).is_file()
+                found = any(path.is_file() for path in root.glob(name.text))
             else:
                 found = known[name.kind] is None or any(fnmatchcase(item, name.text) for item in known[name.kind])
             if not found:
@@ -180,9 +180,9 @@ class Budget:
                 lines.append(f"'{name.text}' is named twice, {name.where}: leave it in one place")
             if name.kind not in ("compiler", "scenario"):
                 seen.add((name.kind, name.text))
-        listed = {name.text for name in self.names if name.kind == "file"}
+        listed = tuple(name.text for name in self.names if name.kind == "file")
         return lines + [f"'{file}' is in no module: add it to the files of one in firmware/budget.toml"
-                        for file, defined in sources.functions.items() if file not in listed and (defined or sources.variables[file])]
+                        for file, defined in sources.functions.items() if not fits(file, listed) and (defined or sources.variables[file])]
 
 
 def fits(name: str, patterns: tuple[str, ...]) -> bool:
