@@ -98,7 +98,7 @@ void application_watch(void)
     took = (uint16_t)(board_drive.ticks - application_since);
     if (took <= LATE_TICKS) {
         ClrWdt();
-    } else if (board_drive.fault == (uint16_t)FAULT_NONE && drive_is_running(&board_drive) && took < STOP_TICKS) {
+    } else if (drive_conducts(&board_drive) && took < STOP_TICKS) {
         board_drive.command.run = 0;
         ClrWdt();
     } else { /* it stands, or does not stop: the watchdog has the last word */

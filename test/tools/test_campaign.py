@@ -320,7 +320,7 @@ def test_a_sensor_at_the_rail_stops_at_once_and_is_named(bench):
 
 def test_every_bit_of_the_firmwares_memory_has_a_name_and_flips_once(bench):
     drive, *others = bench.memory
-    assert drive.name == memory.DRIVE and drive.size > 200 and {"board_panel"} <= {item.name for item in others}
+    assert drive.name == memory.DRIVE and drive.size > 200 and {"app_panel"} <= {item.name for item in others}
     assert "written" not in {item.name for item in others} # what registers must hold is in flash
     assert all(item.size > 0 for item in others) and not [item for item in others if item.name.startswith("vb_")]
     code = ("import ctypes, sys; from tools.bench import memory; from tools.bench.board import Library; from pathlib import Path; "
