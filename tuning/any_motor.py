@@ -103,8 +103,15 @@ def shared_firmware() -> Firmware:
     objects = [paths.ROOT / name for name in (folder / "contents").read_text(encoding="utf-8").split() if not name.endswith("/main.o")]
     with_header = [path for path in objects if HEADER in path.with_suffix(".d").read_text(encoding="utf-8")]
     flags = shlex.split((folder / "flags").read_text(encoding="utf-8")) + [f"-Itools/{room}" for room in ("plant", "chip", "vboard", "cpu_host")]
-    sources = [str(path.with_suffix(".c") if path.with_suffix(".c").exists() else path.relative_to(folder).with_suffix(".c")) for path in with_header]
+    sources = [_source(path, folder) for path in with_header]
     return Firmware(flags, sources, [str(path) for path in objects if path not in with_header])
+
+
+def _source(path: Path, folder: Path) -> str:
+    """Of an object: what make has written beside it, the application that it was made from, or the file in the same place of the project."""
+    if (named := path.with_suffix(".from")).exists():
+        return named.read_text(encoding="utf-8").strip()
+    return str(path.with_suffix(".c") if path.with_suffix(".c").exists() else path.relative_to(folder).with_suffix(".c"))
 
 
 def row_of(job: Job) -> dict[str, Any]:

@@ -233,6 +233,7 @@ uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t 
 }
 
 #define SIGNALS_TURNS_MS 256u      /* from here on a whole turn ends the sum: angles that the estimator has wrong at its ends count less and less */
+#define SIGNALS_TURN_ERPM 6000     /* faster turns have fewer than ten looks each, and where the looks meet the same angles again they would sum up */
 #define SIGNALS_TURN_MOST_MS 1024u /* a turn that does not end is none */
 
 uint16_t signals_offset(signals_t *s, const drive_t *d, const drive_params_t *p)
@@ -241,7 +242,8 @@ uint16_t signals_offset(signals_t *s, const drive_t *d, const drive_params_t *p)
     const sincos_t at = d->frame;
     const uint16_t whole = (uint16_t)(s->sine_q15 < 0 && at.sin >= 0), before = s->emf_stood;
     s->sine_q15 = at.sin;
-    if (!signals_are_judged(d) || held_angle_stands(&d->run.held) || s->emf_ms >= SIGNALS_TURN_MOST_MS) {
+    if (!signals_are_judged(d) || held_angle_stands(&d->run.held) || qm_beyond(observer_speed(&d->run.observer), SIGNALS_TURN_ERPM / SPEED_UNIT)
+        || s->emf_ms >= SIGNALS_TURN_MOST_MS) {
         s->emf_stood = 0;
     } else if (!whole || s->emf_ms < SIGNALS_TURNS_MS) {
         s->emf_q12.cosine += qm_hi(2 * (qm_mulss(emf.d, at.cos) - qm_mulss(emf.q, at.sin)));

@@ -109,7 +109,7 @@ class Suite:
             raise BuildError("no Unity: run make test first")
         vendor = os.path.relpath(vendor, self.base)
         frame = [self.unit(f"{vendor}/unity/src/unity.c", []), self.unit(f"{vendor}/cmock/src/cmock.c", [])]
-        firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/**/*.c"))] + ["tools/cpu_host/xc.c"]
+        firmware = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("firmware/**/*.c")) if p.parent.name != "app" or p.name == "panel.c"] + ["tools/cpu_host/xc.c"]
         self.firmware = {u.object: u for u in (self.unit(source, []) for source in firmware)}
         if behaviour: # the virtual board runs for minutes of motor time: all of it optimized
             board = [str(p.relative_to(self.base)) for p in sorted(self.base.glob("tools/*/*.c")) if p.name != "xc.c"]

@@ -147,8 +147,13 @@ def one_unit(sources: list[str]) -> str:
     """All sources as one, as the image is compiled: each header is looked at once, not with every source that includes it. Nothing is said of this
     file itself."""
     unit = BUILD / "unit.c"
-    unit.write_text("".join(f'#include "{source}"\n' for source in sources if source not in CHECKS_OF_PARAMETERS))
+    unit.write_text("".join(f'#include "{source}"\n' for source in sources if source not in (*CHECKS_OF_PARAMETERS, *other_applications())))
     return str(unit)
+
+
+def other_applications() -> list[str]:
+    """Of the applications one is in a unit, the panel; the others are looked at alone, as delivered."""
+    return sorted(str(path) for path in Path("firmware/app").glob("*.c") if path.name != "panel.c")
 
 
 def cppcheck(unit: str, texts: dict[tuple[str, ...], frozenset], sources: list[str]) -> list[Finding]:
@@ -204,6 +209,7 @@ def main() -> int:
 
     unit = one_unit(sources)
     texts = {source: distinct(source, configurations()) for source in (unit, *CHECKS_OF_PARAMETERS)}
+    texts |= {source: distinct(source, [()]) for source in other_applications()}
     jobs = [(source, defines(configuration)) for source, its in texts.items() for configuration in its]
     checks = {
         "cppcheck": lambda: cppcheck(unit, distinct(unit, [*configurations(), ON_TARGET]), sources),

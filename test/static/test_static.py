@@ -62,7 +62,7 @@ def test_what_stands_in_any_branch_of_any_if_is_analysed_in_one_of_the_configura
     static.BUILD.mkdir(parents=True, exist_ok=True)
     sources = sorted(map(str, Path("firmware").rglob("*.c")))
     seen, missed = set(), {}
-    for source in (static.one_unit(sources), *static.CHECKS_OF_PARAMETERS):
+    for source in (static.one_unit(sources), *static.CHECKS_OF_PARAMETERS, *static.other_applications()):
         texts = static.distinct(source, [*static.configurations(), static.ON_TARGET])
         seen |= {line[:2] for configuration in static.cover(texts) for line in texts[configuration]}
     for path in (*Path("include").rglob("*.h"), *Path("firmware").rglob("*.c")):

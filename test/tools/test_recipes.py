@@ -42,7 +42,7 @@ class Tree:
 
     def compile(self, holds: str = "1", *flags: str) -> None:
         """All of the firmware as one unit, and a condition."""
-        files = [path.relative_to(self.root) for path in sorted(self.root.glob("firmware/**/*.c")) if path.name != "main.c"]
+        files = [path.relative_to(self.root) for path in sorted(self.root.glob("firmware/**/*.c")) if path.name != "main.c" and path.parent.name != "app"]
         source = "".join(f'#include "{path}"\n' for path in files) + f"_Static_assert({holds}, \"arrived\");\n"
         arguments = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-Wno-unused-function", "-fsyntax-only", "-Itools/cpu_host", "-Iinclude", "-I.", *flags]
         done = subprocess.run(["gcc", *arguments, "-xc", "-"], input=source, cwd=self.root, capture_output=True, text=True, check=False)
@@ -62,13 +62,13 @@ class Tree:
 
 
 def add_fault(tree: Tree) -> None:
-    tree.row("include/drive/faults.h", "DRIVE_FAULT_TABLE", 'X(21, BELT, FAULT_STAYS, "protection_check_rotor", "the belt slips", "tighten the belt")')
+    tree.row("include/drive/faults.h", "DRIVE_FAULT_TABLE", 'X(22, BELT, FAULT_STAYS, "protection_check_rotor", "the belt slips", "tighten the belt")')
     tree.at_end("firmware/drive/protection.c", "protection_check_rotor", "if (d->ticks == 7u) {\n        drive_raise(d, FAULT_BELT);\n    }")
     tree.row("include/drive/states.h", "TRANSITIONS_BY_ROTOR_OR_SIGNAL", 'X(FAULT, "BELT: it slips")')
     stall = (ROOT / "tools/bench/scenarios/fault_stall.toml").read_text(encoding="utf-8")
     tree.put("tools/bench/scenarios/fault_NAME.toml", stall.replace("START_FAILED", "BELT"))
-    tree.compile("FAULT_BELT == 21 && FAULT_COUNT == 22")
-    assert "| 21 | BELT |  | the belt slips | tighten the belt | [`protection_check_rotor`](../firmware/drive/protection.c) |" in tree.page("faults")
+    tree.compile("FAULT_BELT == 22 && FAULT_COUNT == 23")
+    assert "| 22 | BELT |  | the belt slips | tighten the belt | [`protection_check_rotor`](../firmware/drive/protection.c) |" in tree.page("faults")
     tree.passes("test/unit/test_fault_page.py")
 
 

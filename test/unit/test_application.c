@@ -189,6 +189,17 @@ void test_a_fault_of_its_own_is_APPLICATION_but_for_a_lost_command_signal(void)
     }
 }
 
+void test_what_is_asked_once_is_asked_once(void)
+{
+    wanted.clear_fault = 1;
+    wanted.take_command = 1;
+    wanted.fault = (uint16_t)FAULT_APPLICATION;
+    board_ms(2);
+    TEST_ASSERT_EQUAL_UINT16(0, stood.clear_fault);
+    TEST_ASSERT_EQUAL_UINT16(0, stood.take_command);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, stood.fault);
+}
+
 void test_outputs_are_on_their_pins(void)
 {
     wanted.outputs = (uint16_t)APP_LED_ALIVE;
@@ -243,6 +254,10 @@ void test_a_drive_that_does_not_stop_within_three_seconds_goes_off(void)
     application_watch();
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
     board_drive.ticks = (uint16_t)(board_drive.ticks + 2u);
+    reset_keep(FAULT_NONE);
     application_watch();
+    TEST_ASSERT_EQUAL_UINT16(FAULT_APPLICATION, board_drive.fault);
+    RCON = 1u << 4; /* WDTO: the background has not been there any more, and the reset tells the name all the same */
+    firmware_init();
     TEST_ASSERT_EQUAL_UINT16(FAULT_APPLICATION, board_drive.fault);
 }

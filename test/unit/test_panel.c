@@ -361,6 +361,17 @@ void test_without_dead_ends_no_position_is_a_fault(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }
 
+void test_a_lost_potentiometer_stays_lost_for_longer_than_a_word_counts(void)
+{
+    drive_params_t with = dead_ends();
+    uint32_t ms;
+    the_pot.now_q15 = INT16_MIN;
+    (void)pot_is_lost(&the_pot, &with, 100);
+    for (ms = 0; ms < 70000ul; ms++) {
+        TEST_ASSERT_EQUAL_UINT16(1, pot_is_lost(&the_pot, &with, 1));
+    }
+}
+
 /* ---- wishes that nobody had ---- */
 
 void test_a_flipped_bit_of_the_wish_or_of_the_range_shows_and_a_wish_does_not(void)

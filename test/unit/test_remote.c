@@ -50,6 +50,19 @@ void setUp(void)
     panel_turn_pot(512);
 }
 
+void test_an_application_that_asks_for_no_run_does_not_end_a_clients(void)
+{
+    const asked_t none = { .elapsed_ms = 1, .remote = &command };
+    uint16_t ms;
+    client(REMOTE_TARGET, 1, 6000);
+    attended_ms(5);
+    for (ms = 0; ms < 5u; ms++) {
+        request_tick(&the_request, &drive, &params, &none);
+        TEST_ASSERT_EQUAL_INT16(1, the_request.wish_run);
+        TEST_ASSERT_EQUAL_INT16(6000, drive.command.target_erpm);
+    }
+}
+
 void test_without_a_client_the_panel_is_in_command(void)
 {
     int16_t of_pot = drive.command.target_erpm;

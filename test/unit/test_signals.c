@@ -210,16 +210,22 @@ static uint16_t offset_look(angle_t angle, int16_t emf_q12, alphabeta_t stands_q
 }
 
 /** Milliseconds until it is found, at most 3000. */
-static uint16_t ms_until_offset(int16_t alpha_q12, int16_t beta_q12, uint16_t step)
+static uint16_t ms_until_offset_at(int16_t omega_erpm, int16_t alpha_q12, int16_t beta_q12, uint16_t step)
 {
     const alphabeta_t stands_q12 = { alpha_q12, beta_q12 };
     uint16_t ms = 0, found = (uint16_t)FAULT_NONE;
+    drive.run.observer.omega_q16 = omega_erpm * 65536;
     while (ms < 3000u && found == (uint16_t)FAULT_NONE) {
         ms++;
         found = offset_look((angle_t)(ms * step), 700, stands_q12);
     }
     TEST_ASSERT_EQUAL_UINT16((ms < 3000u) ? FAULT_CURRENT_SENSOR : FAULT_NONE, found);
     return ms;
+}
+
+static uint16_t ms_until_offset(int16_t alpha_q12, int16_t beta_q12, uint16_t step)
+{
+    return ms_until_offset_at(1050, alpha_q12, beta_q12, step);
 }
 
 /** Two sums, or three where the first one began within a turn. */
@@ -253,6 +259,7 @@ void test_a_speed_that_swings_with_the_turn_leaves_none(void)
     static const alphabeta_t none = { 0, 0 };
     uint32_t angle_q16 = 0;
     uint16_t ms;
+    drive.run.observer.omega_q16 = 1050 * 65536;
     for (ms = 0; ms < 3000u; ms++) {
         const int16_t swing_q15 = trig_sincos((angle_t)(angle_q16 >> 16)).sin / 2;
         const uint32_t step_q16 = (uint32_t)TURN_STEP * (uint32_t)(65536 + 2 * swing_q15);
@@ -261,10 +268,20 @@ void test_a_speed_that_swings_with_the_turn_leaves_none(void)
     }
 }
 
+void test_turns_that_a_millisecond_cannot_tell_from_a_standing_field_are_not_summed(void)
+{
+    const int16_t above = (int16_t)(4 * params.adaptation.emf_least_q12);
+    EACH_DIRECTION(sign) {
+        TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset_at((int16_t)(sign * 6010), above, 0, TURN_STEP));
+        TEST_ASSERT_TRUE(ms_until_offset_at((int16_t)(sign * 5990), above, 0, TURN_STEP) < 1000u);
+    }
+}
+
 void test_one_sum_alone_is_none_and_the_next_is_summed_anew(void)
 {
     const alphabeta_t stands_q12[] = { { (int16_t)(3 * params.adaptation.emf_least_q12), 0 }, { 0, 0 } };
     uint16_t ms;
+    drive.run.observer.omega_q16 = 1050 * 65536;
     for (ms = 0; ms < 3000u; ms++) {
         TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, offset_look((angle_t)(ms * TURN_STEP), 700, stands_q12[(ms / 286u) & 1u]));
     }
