@@ -47,6 +47,7 @@
 #define NOMINAL_SPEED_RPM 2800      /* [rpm]           20 .. 30000    potentiometer at full scale, S3 off; the estimator's derivative changes here */
 #define MAXIMUM_SPEED_RPM 5500      /* [rpm]           20 .. 32000    potentiometer at full scale, S3 on */
 #define SPEEDREFRAMP_RPM_PER_S 4000 /* [rpm/s]         1 .. 60000     slope of the speed reference */
+#define SPEEDREF_DECEL_RPM_PER_S 0  /* [rpm/s]         0 .. 60000     slope of the speed reference towards standstill, in a stop too; 0: SPEEDREFRAMP_RPM_PER_S */
 #define TUNING_DELAY_RAMPUP 0xF     /* [periods]       0 .. 4095      TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods */
 #define POT_LIVE_ZERO 0.0           /* [1]             0 .. 0.2       dead end at each side of the potentiometer's travel: a signal in its outer half is a broken wire; 0: none */
 
@@ -191,6 +192,7 @@
  *   estimator.nominal_erpm               2800 rpm             14000  erpm                           exact  one-sample derivative above
  *   estimator.decimate_erpm               280 rpm              1400  erpm                           exact  sign of Equation 2 from the filtered speed below
  *   speed_ramp_q16                       4000 rpm/s          524288  Q16 erpm every 8 periods       exact  slope of the reference
+ *   speed_decel_q16                      4000 rpm/s          524288  Q16 erpm every 8 periods       exact  the same towards standstill
  *   tuning_step_q16                        15 periods         32768  Q16 erpm every 8 periods       exact  slope in TUNING
  *   ramp_hold_erpm                        350 rpm              1750  erpm                           exact  the ramp waits when the motor is further behind
  *   overspeed_erpm                       6540 rpm             32700  erpm                           exact  lost lock above

@@ -85,6 +85,8 @@ static void speeds(void)
     FIELD(estimator.nominal_erpm, EIGHT_SAMPLES_ERPM / PARAM_F(NOPOLESPAIRS), "rpm", erpm, "erpm", "one-sample derivative above");
     FIELD(estimator.decimate_erpm, NOMINAL_SPEED_RPM / 10.0, "rpm", erpm, "erpm", "sign of Equation 2 from the filtered speed below");
     FIELD(speed_ramp_q16, SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots / 65536.0, "Q16 erpm every 8 periods", "slope of the reference");
+    FIELD(speed_decel_q16, SPEEDREF_DECEL_RPM_PER_S ? SPEEDREF_DECEL_RPM_PER_S : SPEEDREFRAMP_RPM_PER_S, "rpm/s", erpm / slots / 65536.0, "Q16 erpm every 8 periods",
+          "the same towards standstill");
     FIELD(tuning_step_q16, TUNING_DELAY_RAMPUP, "periods", TUNING_DELAY_RAMPUP / (65536.0 * SLOW_PERIODS / SPEED_UNIT / (TUNING_DELAY_RAMPUP + 1.0)), "Q16 erpm every 8 periods",
           "slope in TUNING");
     FIELD(ramp_hold_erpm, NOMINAL_SPEED_RPM / 8.0, "rpm", erpm, "erpm", "the ramp waits when the motor is further behind");

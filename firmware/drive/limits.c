@@ -2,6 +2,7 @@
 #include "drive/limits.h"
 
 #include "drive/protection.h"
+#include "drive/speed.h"
 
 voltage_q14_t limits_free_voltage(const drive_control_t *c)
 {
@@ -113,7 +114,7 @@ static uint16_t limits_ramp_reasons(const drive_t *d, const drive_params_t *p)
     if (d->run.control.ramp_waits) {
         return (uint16_t)LIMIT_RAMP | (uint16_t)LIMIT_RAMP_WAITS;
     }
-    return (uint16_t)((left > qm_hi(2 * p->speed_ramp_q16 - 1)) ? LIMIT_RAMP : LIMIT_NONE);
+    return (uint16_t)((left > qm_hi(2 * reference_slope(p, d->run.control.reference_erpm, target) - 1)) ? LIMIT_RAMP : LIMIT_NONE);
 }
 
 /** What holds the current's references in closed loop. */

@@ -24,6 +24,11 @@ static int16_t reference_may_move(const drive_t *d, const drive_params_t *p, spe
     return (int16_t)(ahead > -p->ramp_hold_erpm);
 }
 
+int32_t reference_slope(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t target)
+{
+    return ((reference < 0) ? target > reference : target < reference) ? p->speed_decel_q16 : p->speed_ramp_q16;
+}
+
 void reference_step(drive_t *d, const drive_params_t *p, speed_erpm_t target, int32_t step_q16)
 {
     drive_control_t *c = &d->run.control;
@@ -106,7 +111,8 @@ current_q13_t speed_current_step(drive_run_t *run, const drive_params_t *p, spee
 void speed_reference_step(drive_t *d, const drive_params_t *p)
 {
     if (!mode_reference_step(d, p)) {
-        reference_step(d, p, mode_speed_target(d, p), p->speed_ramp_q16);
+        speed_erpm_t target = mode_speed_target(d, p);
+        reference_step(d, p, target, reference_slope(p, d->run.control.reference_erpm, target));
     }
 }
 

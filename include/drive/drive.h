@@ -61,6 +61,7 @@ struct drive_params {
     uint16_t pot_zero_q16;     /**< dead end of the potentiometer's travel, POT_LIVE_ZERO */
     uint16_t pot_scale_q15;    /**< 1 / (1 - 2 POT_LIVE_ZERO) */
     int32_t speed_ramp_q16;    /**< reference step every 8 periods, electrical rpm with 16 fraction bits */
+    int32_t speed_decel_q16;   /**< the same towards standstill, SPEEDREF_DECEL_RPM_PER_S or speed_ramp_q16 */
     int32_t tuning_step_q16;   /**< the same in TUNING */
     int16_t ramp_hold_erpm;    /**< the ramp waits while the motor is this far behind (or ahead when slowing) */
     uint16_t stall_steps;      /**< steps of 16 periods below half the reference that are a stall */

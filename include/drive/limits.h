@@ -11,9 +11,9 @@
     X(2, CURRENT, "the q current is at what MAXIMUM_CURRENT_A and the d current leave", \
       "take load off, accelerate more gently (SPEEDREFRAMP_RPM_PER_S); raise MAXIMUM_CURRENT_A if motor and board withstand it") \
     X(4, BRAKE, "the bus is above REGEN_LIMIT_V and takes no more braking current", \
-      "slow down more gently (SPEEDREFRAMP_RPM_PER_S), or use a supply that takes the current") \
+      "slow down more gently (SPEEDREF_DECEL_RPM_PER_S), or use a supply that takes the current") \
     X(8, RAMP, "the speed reference is on its way to its target", \
-      "raise SPEEDREFRAMP_RPM_PER_S if the motor can follow faster") \
+      "raise SPEEDREFRAMP_RPM_PER_S, or SPEEDREF_DECEL_RPM_PER_S, if the motor can follow faster") \
     X(16, RAMP_WAITS, "the ramp waits for a motor that is too far from the reference", \
       "look for VOLTAGE, CURRENT or BRAKE beside it; else check the load") \
     X(32, FIELD_WEAKENING, "field weakening's d current takes its part of MAXIMUM_CURRENT_A", \

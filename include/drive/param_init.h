@@ -30,6 +30,7 @@
         .maximum_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(MAXIMUMSPEED_ELECTR)), \
         .end_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(ENDSPEED_ELECTR)), \
         .speed_ramp_q16 = SPEEDREFRAMP, \
+        .speed_decel_q16 = SPEEDREF_DECEL, \
         .tuning_step_q16 = TUNING_STEP_Q16, \
         .ramp_hold_erpm = (int16_t)PARAM_ROUND(SPEED_COUNTS(PARAM_F(NOMINAL_SPEED_RPM) * PARAM_F(NOPOLESPAIRS) * PARAM_F(RAMP_HOLD_SHARE))), \
         .pot_zero_q16 = (uint16_t)(PARAM_F(POT_LIVE_ZERO) * 65536.0F + 0.5F), \

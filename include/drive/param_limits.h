@@ -34,6 +34,7 @@
     X(NOMINAL_SPEED_RPM, "rpm", 20, 30000, FROM_TUNER, "potentiometer at full scale, S3 off; the estimator's derivative changes here") \
     X(MAXIMUM_SPEED_RPM, "rpm", 20, 32000, FROM_MOTOR, "potentiometer at full scale, S3 on") \
     X(SPEEDREFRAMP_RPM_PER_S, "rpm/s", 1, 60000, FROM_TUNER, "slope of the speed reference") \
+    X(SPEEDREF_DECEL_RPM_PER_S, "rpm/s", 0, 60000, 0, "slope of the speed reference towards standstill, in a stop too; 0: SPEEDREFRAMP_RPM_PER_S") \
     X(TUNING_DELAY_RAMPUP, "periods", 0, 4095, 0xF, "TUNING: one electrical rpm every TUNING_DELAY_RAMPUP + 1 periods") \
     X(POT_LIVE_ZERO, "1", 0, 0.2, 0.0, "dead end at each side of the potentiometer's travel: a signal in its outer half is a broken wire; 0: none")
 
@@ -135,6 +136,8 @@
     X(PARAM_PWM_REST < 0.01F, \
       PARAM_NAMED(LOOPTIME_SEC) " must be a multiple of 50 ns, as 0.00005 is: the PWM counts up and down in steps of 25 ns") \
     PARAM_RELATION_GAIN(X, KCURRA) PARAM_RELATION_GAIN(X, KCURRB) \
+    X(PARAM_F(SPEEDREF_DECEL_RPM_PER_S) == 0.0F || PARAM_F(SPEEDREF_DECEL_RPM_PER_S) >= 1.0F, \
+      PARAM_NAMED(SPEEDREF_DECEL_RPM_PER_S) " must be 0, for SPEEDREFRAMP_RPM_PER_S, or at least 1") \
     X(RECORDER_PERIODS != 1 && ((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
       PARAM_NAMED(RECORDER_PERIODS) " must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
     X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, \

@@ -11,6 +11,10 @@ speed_erpm_t speed_ramp(speed_erpm_t reference, speed_erpm_t target, int16_t ste
 /** One step of the reference towards the target; what a step has below a whole electrical rpm counts in the next. @param step_q16 0 or more */
 void reference_step(drive_t *d, const drive_params_t *p, speed_erpm_t target, int32_t step_q16);
 
+/** Slope of the reference on its way to a target: SPEEDREF_DECEL_RPM_PER_S where its magnitude falls, else SPEEDREFRAMP_RPM_PER_S.
+ *  @return electrical rpm every 8 periods, 16 fraction bits, above 0 */
+int32_t reference_slope(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t target);
+
 /** The observer's rate and the gain that goes with it. */
 void speed_schedule(drive_run_t *run, const drive_params_t *p);
 

@@ -129,6 +129,18 @@ void test_ramp_is_the_reason_while_the_reference_is_two_steps_or_more_from_its_t
     }
 }
 
+void test_ramp_down_is_the_reason_until_two_steps_of_its_own_slope_are_left(void)
+{
+    drive_params_t gentle = params;
+    gentle.speed_decel_q16 = 2 * 65536;
+    EACH_FREE {
+        drive.command.target_erpm = (int16_t)(way * (10000 - 4));
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_RAMP, limits_reasons(&drive, &gentle));
+        drive.command.target_erpm = (int16_t)(way * (10000 - 3));
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_NONE, limits_reasons(&drive, &gentle));
+    }
+}
+
 void test_ramp_waits_for_the_motor_at_any_distance_and_at_its_target_it_does_not_wait(void)
 {
     EACH_FREE {

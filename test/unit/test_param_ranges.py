@@ -170,6 +170,8 @@ RELATIONS = {
     # 1126 * 24 * 2 us / 50 us / 7.24 = 149.3
     "END_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("END_SPEED_RPM", "149", "150")],
     "MINIMUM_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("MINIMUM_SPEED_RPM", "149", "150")],
+    "SPEEDREF_DECEL_RPM_PER_S must be 0, for SPEEDREFRAMP_RPM_PER_S, or at least 1": [
+        case("SPEEDREF_DECEL_RPM_PER_S", "0.99", "1"), case("SPEEDREF_DECEL_RPM_PER_S", "0.001", "0")],
     "RECORDER_PERIODS must be 0, 2, 4": [case("RECORDER_PERIODS", "1", "2"), case("RECORDER_PERIODS", "3", "4"), case("RECORDER_PERIODS", "63", "64"),
                                          case("RECORDER_PERIODS", "5", "0")],
     "SPEED_BANDWIDTH_HZ must be at most 0.148 * LOAD_BANDWIDTH_HZ": [

@@ -40,6 +40,31 @@ void test_reference_waits_while_the_motor_is_350_rpm_behind_or_ahead(void)
     }
 }
 
+void test_reference_falls_by_its_own_slope_in_both_directions_and_in_a_stop(void)
+{
+    static const struct {
+        int16_t target_erpm, next_erpm;
+        drive_state_t state;
+    } cases[] = { { 20000, 10008, DRIVE_CLOSED }, { 3000, 9998, DRIVE_CLOSED }, { 3000, 9998, DRIVE_STOPPING }, { 20000, 9998, DRIVE_STOPPING },
+                  { 9997, 9997, DRIVE_CLOSED } /* two steps */ };
+    drive_params_t gentle = params;
+    gentle.speed_decel_q16 = 2 * 65536;
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            rig_closed(direction, (int16_t)(direction * 10000));
+            drive.command.target_erpm = (int16_t)(direction * cases[n].target_erpm);
+            drive.state = (uint16_t)cases[n].state;
+            speed_reference_step(&drive, &gentle);
+            TEST_ASSERT_EQUAL_INT16_MESSAGE(direction * cases[n].next_erpm, drive.run.control.reference_erpm, golden_row(n));
+        }
+    }
+}
+
+void test_without_a_slope_of_its_own_the_reference_falls_as_it_rises(void)
+{
+    TEST_ASSERT_EQUAL_INT32(params.speed_ramp_q16, params.speed_decel_q16);
+}
+
 /* ---- the law ---- */
 
 /** q current for a target, at an observed speed and load. */

@@ -125,6 +125,7 @@ void test_every_speed_is_in_counts_and_every_gain_per_count(void)
     EXACT(p.fieldweak.index_per_count_q16, 4 * 64);
     EXACT(p.fieldweak.esdq_per_erpm_q13, 56221);         /* 4 * 14055.2 */
     EXACT(p.speed_ramp_q16, 183501);                     /* 4000 rpm/s * 7 * 0.4 ms / 4 */
+    EXACT(p.speed_decel_q16, 183501);
     EXACT(p.tuning_step_q16, 8192);                      /* 1/8 of a count in eight periods: one electrical rpm in 16 */
     TEST_ASSERT_INT16_WITHIN(3, 22151, p.speed_kp_q13);  /* 23 Hz: 2 pi f J / Kt * 2 pi / 60 / 7 A per electrical rpm, four times */
     TEST_ASSERT_INT16_WITHIN(1, 362, p.sample_shift_q16); /* 1.5 us psi / L per electrical rpm, four times */

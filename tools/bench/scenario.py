@@ -133,7 +133,7 @@ def stretched(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: 
 
 def _delays(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: float) -> Iterator[tuple[float, float]]:
     """When something takes longer than the file leaves for it, and by how much; the first is the start."""
-    slope, now, coasting = param(params, "SPEEDREFRAMP_RPM_PER_S"), 0.0, coast_s_per_rpm
+    slope, down, now, coasting = param(params, "SPEEDREFRAMP_RPM_PER_S"), decel_rpm_s(params), 0.0, coast_s_per_rpm
 
     def settle_s(rpm: float) -> float:
         hz, full_hz = param(params, "SPEED_BANDWIDTH_HZ"), param(params, "LOAD_BANDWIDTH_HZ") / FULL_RATIO
@@ -145,13 +145,13 @@ def _delays(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: fl
         if event.kind == "speed_rpm":
             before, now = now, event.value
             if presses and event.at_s > presses[0]:
-                yield event.at_s, max(abs(now - before) / slope - RAMP_S, (before - now) * coasting - RAMP_S, 0.0) + settle_s(now)
+                yield event.at_s, max((now - before) / slope - RAMP_S, (before - now) / down - RAMP_S, (before - now) * coasting - RAMP_S, 0.0) + settle_s(now)
         elif event.at_s in presses[:1]:
             allowed = next((item.within_s for item in scenario.expectations if hasattr(item, "overshoot_percent")), 0.0)
             to_speed_s = max(now - param(params, "END_SPEED_RPM"), 0.0) / slope
             yield event.at_s, max(start_time_s(params) - allowed, 0.0) + max(to_speed_s - RAMP_S, 0.0) + settle_s(now)
         elif event.at_s in presses:
-            yield event.at_s, max(now / slope - RAMP_S, now * coasting - RAMP_S, 0.0) + 2.0 * settle_s(now)
+            yield event.at_s, max(now / down - RAMP_S, now * coasting - RAMP_S, 0.0) + 2.0 * settle_s(now)
         elif event.kind == "set" and BRAKE in event.keys:
             coasting = 0.0 if event.keys[BRAKE] else coast_s_per_rpm
 
@@ -190,6 +190,11 @@ def _share(percent: float, rating: Rating, least_rpm: float) -> float:
 
 def _named_speed(name: str, params: Mapping[str, float]) -> float:
     return param(params, f"{name.upper()}_SPEED_RPM")
+
+
+def decel_rpm_s(params: Mapping[str, float]) -> float:
+    """Slope of the speed reference towards standstill."""
+    return params.get("SPEEDREF_DECEL_RPM_PER_S") or param(params, "SPEEDREFRAMP_RPM_PER_S")
 
 
 def param(params: Mapping[str, float], name: str) -> float:

@@ -22,7 +22,7 @@ from tools.common.trace import wrapped_deg
 from . import command_common, draws, injection, judge, page, reach, simulate
 from .board import Board
 from .run import Run
-from .scenario import BRAKE, Event, Scenario, param, start_time_s
+from .scenario import BRAKE, Event, Scenario, decel_rpm_s, param, start_time_s
 from .trial import Bench, coast_s
 
 SEGMENT_S = 40.0
@@ -168,7 +168,7 @@ class _Drawing:
         self.bus_v = float(self.plant["supply.voltage_v"])
         self.slow, self.nominal, self.most = (param(self.params, f"{what}_SPEED_RPM") for what in ("MINIMUM", "NOMINAL", "MAXIMUM"))
         self.slow += MIDDLE * (self.nominal - self.slow) if mode else 0.0
-        self.slope = param(self.params, "SPEEDREFRAMP_RPM_PER_S")
+        self.slope = min(param(self.params, "SPEEDREFRAMP_RPM_PER_S"), decel_rpm_s(self.params))
         self.settle_s = max(8.0 / param(self.params, "SPEED_BANDWIDTH_HZ"), 0.7)
         self.events: list[Event] = []
         self.rests: list[tuple[float, float, float]] = []

@@ -19,7 +19,7 @@ from .board import Board, Library
 from .injection import Case
 from .panel import Action
 from .run import Run
-from .scenario import BRAKE, Event, Scenario, early_ramp_s, param, start_time_s
+from .scenario import BRAKE, Event, Scenario, decel_rpm_s, early_ramp_s, param, start_time_s
 
 EVERY, MOST_ROWS = 4, 400_000
 """Periods to a row of the trace, and rows at most: a case has five of it at once."""
@@ -86,20 +86,20 @@ def scene(case: Case, bench: Bench) -> Scene:
     load_nm = case.load * motor.rated_torque_nm * (0.2 if case.scene == "field weakening" else 0.7)
     period_s, pairs = param(params, "LOOPTIME_SEC"), param(params, "NOPOLESPAIRS")
     lock_s = param(params, "LOCK_TIME") * period_s
-    slope = param(params, "SPEEDREFRAMP_RPM_PER_S")
+    slope, down = param(params, "SPEEDREFRAMP_RPM_PER_S"), decel_rpm_s(params)
     closed_s = START_S + start_time_s(params)
     speed_s = closed_s + max(abs(first - param(params, "END_SPEED_RPM")) / slope, LOAD_OVER_S) + SETTLE_S
     events = [_event(0.0, "set", keys={BRAKE: min(load_nm, 0.5 * motor.start_torque_nm)}), _event(0.0, "speed_rpm", value=first), *_press(START_S),
               _event(closed_s, "set", keys={BRAKE: load_nm}, over_s=LOAD_OVER_S)]
     if second:
         events.append(_event(speed_s, "speed_rpm", value=second, finds_range=True))
-    ramp_s = abs(second - first) / slope
+    ramp_s = max((second - first) / slope, (first - second) / down)
     end_s = closed_s + judge.SETTLE_S
     begin = {"CALIBRATE": (0.0, 0.045, ()), "STOPPED": (0.06, START_S - 0.06, ()), "BOOTSTRAP": (START_S, 0.009, ("BOOTSTRAP",)),
              "ALIGN": (START_S, 0.95 * lock_s, ("ALIGN",)), "RAMP": (START_S + lock_s, early_ramp_s(params), ("RAMP",)),
              "accelerating": (speed_s + 0.02, 0.9 * ramp_s, ()), "braking": (speed_s + 0.02, 0.9 * ramp_s, ()),
              "field weakening": (speed_s + 0.1 + ramp_s + SETTLE_S, STEADY_S, ()),
-             "STOPPING": (speed_s, 0.5 * first / slope, ("STOPPING",)), "FAULT": (speed_s, 0.5 * CLEAR_S, ("FAULT",)),
+             "STOPPING": (speed_s, 0.5 * first / down, ("STOPPING",)), "FAULT": (speed_s, 0.5 * CLEAR_S, ("FAULT",)),
              "retry": (speed_s, CLEAR_S, RETRY_STATES)}.get(case.scene, (speed_s, STEADY_S, ()))
     if case.scene == "STOPPING":
         events += _press(speed_s)
