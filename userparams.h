@@ -139,6 +139,9 @@
 #define LS_OVER2LS0_SPEED16  0.5
 #define LS_OVER2LS0_SPEED17  0.5
 
+/* ---- Stop: what follows when a stop is requested in closed loop --------------------------------------------------- */
+#define STOP_MODE 0                 /* [mode]          0 .. 2         0: ramp down, then let go; 1: coast, outputs off at once; 2: ramp down to where a short circuit of the winding fits, then short it until the rotor stands */
+
 /* ---- Snapshot ----------------------------------------------------------------------------------------------------- */
 #define SNAPDELAY 5                 /* [periods]       1 .. 32000     one row every SNAPDELAY periods */
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */
@@ -248,6 +251,7 @@
  *   wait_periods                          0.2 s                4000  periods                        exact  and how long it may take at the end of the ramp
  *
  * limits
+ *   PARAM_BRAKE_COUNTS                 1756.6 rpm              8782  erpm                        -0.010 %  the short-circuited winding takes no more current below
  *   current_max_q13                      2.75 A                5120  Q13 A                       -0.000 %  current vector that is asked for
  *   overcurrent_q13                       3.8 A                7075  Q13 A                       +0.001 %  phase current that trips
  *   i2t_most_q25                            0 A^2                 0  Q25 A^2                        exact  heat that trips

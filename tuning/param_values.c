@@ -165,6 +165,7 @@ static void limits(void)
 {
     double bus = BUS_FULL_SCALE_V / 32768.0, most = MAXIMUM_CURRENT_A;
     GROUP("limits");
+    MACRO(PARAM_BRAKE_COUNTS, at_most(most * MOTOR_RS_OHM * PARAM_ERPM_PER_V / pairs, 32767.0 * erpm), "rpm", erpm, "erpm", "the short-circuited winding takes no more current below");
     FIELD(current_max_q13, most, "A", q13_a, "Q13 A", "current vector that is asked for");
 #if MOTOR_SALIENCY_UH
     FIELD(salience_q13, MOTOR_KPHI_V_PER_KRPM / sqrt(3.0) * 60.0 / (2.0 * PI * 1000.0 * pairs) / (MOTOR_SALIENCY_UH * 1e-6), "A", q13_a, "Q13 A",

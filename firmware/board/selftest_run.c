@@ -106,12 +106,13 @@ static void test_registers(void)
 static void test_outputs(void)
 {
     const uint16_t now = P1OVDCON, state = board_drive.state;
+    const uint16_t low = (uint16_t)(state == (uint16_t)DRIVE_BOOTSTRAP || drive_shorts(&board_drive));
     if (now == BOARD_OUTPUTS_OFF || (state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= DEFER_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP)) {
         return;
     }
     if (board_drive.fault != (uint16_t)FAULT_NONE
-        || now != (drive_is_running(&board_drive) ? BOARD_OUTPUTS_PWM : (state == (uint16_t)DRIVE_BOOTSTRAP) ? BOARD_OUTPUTS_BOOTSTRAP
-                                                                                                             : BOARD_OUTPUTS_OFF)) {
+        || now != (drive_is_running(&board_drive) ? BOARD_OUTPUTS_PWM : low ? BOARD_OUTPUTS_BOOTSTRAP
+                                                                            : BOARD_OUTPUTS_OFF)) {
         selftest_fail(SELFTEST_REGISTERS);
     }
 }

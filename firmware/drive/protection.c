@@ -210,7 +210,7 @@ static int32_t overload_part(int32_t a, uint16_t rate_q16)
 
 uint16_t overload_tick(overload_t *o, const drive_t *d, const drive_params_t *p, uint16_t ms)
 {
-    const uint16_t runs = drive_is_running(d);
+    const uint16_t runs = (uint16_t)(drive_is_running(d) || drive_shorts(d));
     uint32_t square = 0; /* a stopped drive's registers keep what flowed last */
     uint16_t rest;
     if (p->i2t_most_q25 == 0) {

@@ -3,6 +3,7 @@
 
 #include "drive/drive.h"
 #include "drive/limits.h"
+#include "drive/protection.h"
 
 speed_erpm_t speed_ramp(speed_erpm_t reference, speed_erpm_t target, int16_t step_erpm)
 {
@@ -149,21 +150,52 @@ static void speed_go_on(drive_t *d)
     drive_enter(d, DRIVE_CLOSED);
 }
 
+/** Where a requested stop leads to at this moment. */
+static drive_state_t speed_stop_leads_to(const drive_t *d, const drive_params_t *p)
+{
+    if ((STOP_MODE) == STOP_COAST) {
+        return DRIVE_STOPPED;
+    }
+    if ((STOP_MODE) == STOP_SHORT && qm_abs(observer_speed(&d->run.observer)) < (int16_t)PARAM_BRAKE_COUNTS) {
+        return DRIVE_BRAKE;
+    }
+    return (d->state == (uint16_t)DRIVE_STOPPING && speed_has_stopped(d, p)) ? DRIVE_STOPPED : DRIVE_STOPPING;
+}
+
 void speed_choose_state(drive_t *d, const drive_params_t *p)
 {
     uint16_t stops = (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING), other = speed_is_to_turn(d);
-    if (!stops) {
-        if (other || !d->command.run) {
-            drive_enter(d, DRIVE_STOPPING);
-        }
-    } else if (d->command.run) {
-        if (!other) {
-            speed_go_on(d);
-        }
-    } else if (speed_has_stopped(d, p)) {
-        drive_enter(d, DRIVE_STOPPED);
-    } else { /* on its way */
+    drive_state_t next = (drive_state_t)d->state;
+    if (!d->command.run) {
+        next = speed_stop_leads_to(d, p);
+    } else if (other) {
+        next = DRIVE_STOPPING;
+    } else if (stops) {
+        speed_go_on(d);
+        return;
+    } else { /* it runs */
     }
+    if ((uint16_t)next != d->state) {
+        drive_enter(d, next);
+    }
+}
+
+#define BRAKE_STANDS_Q13 64 /* four steps of the converter */
+#define BRAKE_STANDS_PERIODS PARAM_PERIODS(0.02F)
+
+drive_state_t speed_brake_step(drive_t *d, const drive_params_t *p)
+{
+    alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b);
+    d->run.control.i_q13.d = (int16_t)(i.alpha >> 1); /* no frame: its length is I2t's */
+    d->run.control.i_q13.q = (int16_t)(i.beta >> 1);
+    d->periods++;
+    if (protection_check_current(d, p)) {
+        return DRIVE_FAULT;
+    }
+    if (qm_beyond(d->phases_q13.a, BRAKE_STANDS_Q13) || qm_beyond(d->phases_q13.b, BRAKE_STANDS_Q13)) {
+        d->periods = 1;
+    }
+    return (d->periods > BRAKE_STANDS_PERIODS) ? DRIVE_STOPPED : DRIVE_BRAKE;
 }
 
 /* wcet: speed_turn_round/drive_set_direction excludes model_update */

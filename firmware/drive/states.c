@@ -89,6 +89,11 @@ uint16_t drive_conducts(const drive_t *d)
                       && (uint16_t)(d->state - (uint16_t)DRIVE_BOOTSTRAP) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_BOOTSTRAP);
 }
 
+INLINE uint16_t drive_shorts(const drive_t *d)
+{
+    return (uint16_t)((STOP_MODE) == STOP_SHORT && d->state == (uint16_t)DRIVE_BRAKE);
+}
+
 uint16_t drive_outputs(const drive_t *d)
 {
     if (d->fault != (uint16_t)FAULT_NONE) {
@@ -97,7 +102,7 @@ uint16_t drive_outputs(const drive_t *d)
     if (drive_is_running(d)) {
         return (uint16_t)OUTPUTS_PWM;
     }
-    return (uint16_t)((d->state == (uint16_t)DRIVE_BOOTSTRAP) ? OUTPUTS_BOOTSTRAP : OUTPUTS_OFF);
+    return (uint16_t)((d->state == (uint16_t)DRIVE_BOOTSTRAP || (drive_shorts(d) && d->periods != 0u)) ? OUTPUTS_BOOTSTRAP : OUTPUTS_OFF);
 }
 
 void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
@@ -146,8 +151,11 @@ void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
         break;
     case DRIVE_CATCH: next = (uint16_t)catch_pass(d, p); break;
     case DRIVE_FAULT:
+    case DRIVE_BRAKE:
     default: /* without a fault when the background raised one while it was cleared here */
-        if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) {
+        if (drive_shorts(d)) {
+            next = (uint16_t)speed_brake_step(d, p);
+        } else if (d->command.clear_fault || d->fault == (uint16_t)FAULT_NONE) {
             calibration_restart(&d->calibration);
             next = (uint16_t)drive_clear_fault(d);
         }

@@ -141,7 +141,7 @@ struct drive {
     volatile uint16_t state; /**< drive_state_t; written by drive_enter() only */
     volatile uint16_t fault; /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
     volatile uint16_t ticks; /**< periods since power-up, wraps; the background's time base */
-    uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP, CATCH and ALIGN count it, RAMP at its end */
+    uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP, CATCH and ALIGN count it, RAMP at its end, BRAKE without current */
     int16_t direction;       /**< +1 or -1, of the run; of a rotor that was caught backwards until it is reversed */
 
     calibration_t calibration;

@@ -9,7 +9,7 @@
  *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
  *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
 #define PARAM_TABLE(X) PARAM_MOTOR(X) PARAM_BOARD(X) PARAM_SPEEDS(X) PARAM_START(X) PARAM_LIMITS(X) PARAM_LOOPS(X) PARAM_FILTERS(X) \
-    PARAM_FIELD_WEAKENING(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_SCOPE(X) PARAM_RETRY(X)
+    PARAM_FIELD_WEAKENING(X) PARAM_STOP(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_SCOPE(X) PARAM_RETRY(X)
 
 #define PARAM_MOTOR(X) /* Motor, values per phase of the star */ \
     X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
@@ -71,6 +71,9 @@
     PARAM_ENTRIES(X, INVKFI_SPEED, "Q15/2", 1024, 32767, NORM_INVKFIBASE, "1/Kphi of each entry") \
     PARAM_ENTRIES(X, LS_OVER2LS0_SPEED, "1", 0.1, 0.6, 0.5, "Ls / (2 Ls0) of each entry; 0.5 = no change")
 
+#define PARAM_STOP(X) /* Stop: what follows when a stop is requested in closed loop */ \
+    X(STOP_MODE, "mode", 0, 2, 0, "0: ramp down, then let go; 1: coast, outputs off at once; 2: ramp down to where a short circuit of the winding fits, then short it until the rotor stands")
+
 #define PARAM_SNAPSHOT(X) /* Snapshot */ \
     X(SNAPDELAY, "periods", 1, 32000, 5, "one row every SNAPDELAY periods") \
     X(DATA_BUFFER_SIZE, "rows", 2, 150, 50, "rows of each of the four arrays")
@@ -124,6 +127,7 @@
 /** Parameters in these units are whole numbers. */
 #define PARAM_COUNTED(unit) \
     (__builtin_strcmp(unit, "pairs") == 0 || __builtin_strcmp(unit, "periods") == 0 || __builtin_strcmp(unit, "rows") == 0 || __builtin_strcmp(unit, "times") == 0 || __builtin_strcmp(unit, "switch") == 0 \
+     || __builtin_strcmp(unit, "mode") == 0 \
      || __builtin_strcmp(unit, "uH") == 0 || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. Of a group in which one wrong value breaks
@@ -236,6 +240,9 @@
     X(PARAM_ACCEL < PARAM_F(PARAM_ACCEL_MOST) && PARAM_ACCEL >= PARAM_F(PARAM_ACCEL_LEAST), \
       PARAM_NAMED(MOTOR_INERTIA_KGM2) " does not fit the load observer's format (of a motor file, [mechanical] or [load] inertia): " \
       "check its unit") \
+    X((STOP_MODE) != 2 || PARAM_BRAKE_COUNTS >= 1.5F * SPEED_COUNTS(MINIMUM_SPEED_ERPM), \
+      PARAM_NAMED(STOP_MODE) " must be 0 or 1 where MAXIMUM_CURRENT_A * MOTOR_RS_OHM is less than 0.000866 * MINIMUM_SPEED_RPM * MOTOR_KPHI_V_PER_KRPM: " \
+      "the winding's short circuit would take more current where the ramp has ended") \
     X(PARAM_QUICK_Q16 <= 24576.0F, "LOAD_BANDWIDTH_HZ * LOOPTIME_SEC must be at most 0.0074, or 0.0037 with a LOOPTIME_SEC below 0.00004: the observer's step is eight or sixteen periods") \
     PARAM_RELATION_HELD(X, END_SPEED_RPM) PARAM_RELATION_HELD(X, MINIMUM_SPEED_RPM) \
     X(PARAM_F(SPEED_BANDWIDTH_HZ) <= PARAM_CALM_HZ, \

@@ -4,6 +4,7 @@
 
 #include "control/qmath.h"
 #include "drive/forward.h"
+#include "drive/states.h"
 
 /** Next reference. @param step_erpm 0 (stays where it is) or more @return target when it is nearer than two steps, else one step closer */
 speed_erpm_t speed_ramp(speed_erpm_t reference, speed_erpm_t target, int16_t step_erpm);
@@ -37,12 +38,24 @@ void speed_reference_step(drive_t *d, const drive_params_t *p);
  *  innovation gate is open 7, 15, too. */
 void speed_follow(drive_run_t *run, const drive_params_t *p);
 
-/** Whether the run goes on or slows down: the wish to stop or a target in the other direction slows it down; a new wish to run goes on from the present speed.
- *  Slot 6 in closed loop. */
+/** What a stop does that is requested in closed loop (STOP_MODE). A target in the other direction always ramps down. */
+typedef enum {
+    STOP_RAMP,  /**< STOPPING: the reference ramps down, then the outputs go off */
+    STOP_COAST, /**< STOPPED: the outputs go off at once and the rotor runs out. Above the bus its back-EMF charges the bus, as after a fault */
+    STOP_SHORT  /**< STOPPING down to brake_erpm, then BRAKE: all low sides on until the rotor stands */
+} stop_mode_t;
+
+/** Whether the run goes on, slows down or ends: a requested stop does what STOP_MODE says, a target in the other direction slows down; a new request
+ *  to run goes on from the present speed. Slot 6 in closed loop. */
 void speed_choose_state(drive_t *d, const drive_params_t *p);
 
 /** In STOPPING, slots 1, 5, 9, 13: when the rotor has slowed down for a target in the other direction, the ramp takes it through zero. */
 void speed_turn_round(drive_t *d, const drive_params_t *p);
+
+/** A period in BRAKE: the winding's short circuit brakes, I = w psi/|Z|, and nothing reaches the bus. The first period leaves the outputs off, so that no
+ *  high side still conducts. A load that turns the rotor keeps it braking, under OVERCURRENT_SW and I2t.
+ *  @return STOPPED when every phase current has been below four steps of the converter for 20 ms, else BRAKE */
+drive_state_t speed_brake_step(drive_t *d, const drive_params_t *p);
 
 /** The controller's trim. Slots 7, 15 in closed loop. */
 void speed_trim_step(drive_t *d, const drive_params_t *p);

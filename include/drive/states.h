@@ -16,7 +16,8 @@
     X(CLOSED, "the estimator's angle drives the motor") \
     X(STOPPING, "closed loop, ramping down to a speed where the outputs can go off") \
     X(FAULT, "outputs off until S2 clears the fault") \
-    X(CATCH, "outputs off: between two looks at a rotor that turns, or while it is too fast")
+    X(CATCH, "outputs off: between two looks at a rotor that turns, or while it is too fast") \
+    X(BRAKE, "STOP_MODE 2, low sides on: the short-circuited winding brakes until the rotor stands")
 
 #define DRIVE_STATE_ENUM(name, meaning) DRIVE_##name,
 
@@ -52,11 +53,14 @@ typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_sta
     TRANSITIONS_BY_CURRENT_OR_BUS(X)
 #define TRANSITIONS_FROM_CLOSED(X) \
     X(STOPPING, "a stop is requested, or a target in the other direction") \
+    X(STOPPED, "STOP_MODE 1: a stop is requested, and the rotor coasts") \
+    X(BRAKE, "STOP_MODE 2: a stop is requested at a speed whose short circuit fits") \
     TRANSITIONS_BY_SUPERVISION(X) \
     TRANSITIONS_BY_CURRENT_OR_BUS(X) \
     TRANSITIONS_BY_ROTOR_OR_SIGNAL(X)
 #define TRANSITIONS_FROM_STOPPING(X) \
     X(STOPPED, "the rotor is slow enough; or dead time hides its speed near the stop's end") \
+    X(BRAKE, "STOP_MODE 2: slow enough for the short circuit") \
     X(RAMP, "slow enough, with a target in the other direction: the ramp takes the rotor through zero") \
     X(CLOSED, "a run is requested again, in this direction") \
     TRANSITIONS_BY_SUPERVISION(X) \
@@ -72,6 +76,10 @@ typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_sta
     X(RAMP, "the rotor is seen, slower than the minimum speed") \
     X(CLOSED, "the rotor is seen, fast enough for the estimator") \
     X(FAULT, "OVERVOLTAGE: the bus does not fall, so the supply holds it") \
+    TRANSITIONS_BY_SUPERVISION(X)
+#define TRANSITIONS_FROM_BRAKE(X) \
+    X(STOPPED, "no current is left: the rotor stands") \
+    X(FAULT, "OVERCURRENT_SW, OVERTEMPERATURE: a load turns the rotor too fast, or for too long") \
     TRANSITIONS_BY_SUPERVISION(X)
 
 /* What every state must bear; these come from an interrupt, a trap or the background, in the middle of anything. From FAULT the first code stays. */
@@ -122,6 +130,9 @@ uint16_t drive_is_closed(const drive_t *d);
 
 /** 1 while the bridge conducts, its drivers' charge with it, BOOTSTRAP to STOPPING: drive_outputs() are not off. In one comparison. */
 uint16_t drive_conducts(const drive_t *d);
+
+/** 1 in BRAKE: the law rests, and the low sides short-circuit the winding. */
+uint16_t drive_shorts(const drive_t *d);
 
 /** What drives the bridge (outputs_t) in the drive's present state. */
 uint16_t drive_outputs(const drive_t *d);

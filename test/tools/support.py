@@ -22,7 +22,7 @@ from tools.common.toml_file import Document
 from tools.common.trace import Trace
 
 PERIOD_S = 50e-6
-STATES = {0: "CALIBRATE", 1: "STOPPED", 2: "BOOTSTRAP", 3: "ALIGN", 4: "RAMP", 5: "CLOSED", 6: "STOPPING", 7: "FAULT", 8: "CATCH"}
+STATES = {0: "CALIBRATE", 1: "STOPPED", 2: "BOOTSTRAP", 3: "ALIGN", 4: "RAMP", 5: "CLOSED", 6: "STOPPING", 7: "FAULT", 8: "CATCH", 9: "BRAKE"}
 FAULTS = {0: "NONE", 1: "OVERCURRENT_HW", 3: "OVERVOLTAGE", 6: "STALL"}
 LIBRARY = paths.ROOT / "build" / "host" / "libvboard.so"
 

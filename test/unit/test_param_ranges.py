@@ -172,6 +172,9 @@ RELATIONS = {
     "MINIMUM_SPEED_RPM must be at least 1126 * NOMINAL_BUS_V": [case("MINIMUM_SPEED_RPM", "149", "150")],
     "SPEEDREF_DECEL_RPM_PER_S must be 0, for SPEEDREFRAMP_RPM_PER_S, or at least 1": [
         case("SPEEDREF_DECEL_RPM_PER_S", "0.99", "1"), case("SPEEDREF_DECEL_RPM_PER_S", "0.001", "0")],
+    # 2.75 A * 2.67 ohm = 7.34 V, 1756 rpm, 1.5 times 1170.9
+    "STOP_MODE must be 0 or 1 where MAXIMUM_CURRENT_A * MOTOR_RS_OHM is less than": [
+        case("STOP_MODE", "2", "1", MINIMUM_SPEED_RPM="1172"), case("MINIMUM_SPEED_RPM", "1172", "1170", STOP_MODE="2")],
     "RECORDER_PERIODS must be 0, 2, 4": [case("RECORDER_PERIODS", "1", "2"), case("RECORDER_PERIODS", "3", "4"), case("RECORDER_PERIODS", "63", "64"),
                                          case("RECORDER_PERIODS", "5", "0")],
     "SPEED_BANDWIDTH_HZ must be at most 0.148 * LOAD_BANDWIDTH_HZ": [
@@ -224,6 +227,8 @@ def test_every_relation_is_broken_by_its_case_and_kept_just_inside() -> None:
     ({"FW_TRIM_CURRENT_A": "18.0"}, "FW_TRIM_CURRENT_A = 18.0 must not exceed MAXIMUM_CURRENT_A = 2.75"),
     ({"MINIMUM_SPEED_RPM": "149"}, "MINIMUM_SPEED_RPM = 149 must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI"),
     ({"RECORDER_PERIODS": "1"}, "RECORDER_PERIODS = 1 must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits"),
+    ({"STOP_MODE": "3"}, "STOP_MODE = 3 is outside 0 .. 2 mode"),
+    ({"STOP_MODE": "2", "MINIMUM_SPEED_RPM": "1172", "END_SPEED_RPM": "1172"}, "STOP_MODE = 2 must be 0 or 1 where MAXIMUM_CURRENT_A * MOTOR_RS_OHM"),
     ({"SPEED_BANDWIDTH_HZ": "17"}, "SPEED_BANDWIDTH_HZ = 17 must be at most 0.148 * LOAD_BANDWIDTH_HZ"),
 ])
 def test_a_broken_relation_stops_the_build_with_its_message(values: dict[str, str], message: str) -> None:

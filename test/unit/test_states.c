@@ -61,15 +61,16 @@ static const char *const state_names[] = { DRIVE_STATE_TABLE(NAME_OF) };
 
 /* A row each, and in it an x for each state that may follow, in the order of the table. */
 static const char *const follow[DRIVE_STATE_COUNT] = {
-    ".x.....x." /* CALIBRATE */,
-    "..x....xx" /* STOPPED */,
-    ".x.x...xx" /* BOOTSTRAP */,
-    ".x..x..x." /* ALIGN */,
-    ".x...x.x." /* RAMP */,
-    "......xx." /* CLOSED */,
-    ".x..xx.x." /* STOPPING */,
-    "xx.....x." /* FAULT */,
-    ".xx.xx.x." /* CATCH */
+    ".x.....x.." /* CALIBRATE */,
+    "..x....xx." /* STOPPED */,
+    ".x.x...xx." /* BOOTSTRAP */,
+    ".x..x..x.." /* ALIGN */,
+    ".x...x.x.." /* RAMP */,
+    ".x....xx.x" /* CLOSED */,
+    ".x..xx.x.x" /* STOPPING */,
+    "xx.....x.." /* FAULT */,
+    ".xx.xx.x.." /* CATCH */,
+    ".x.....x.." /* BRAKE */
 };
 
 void test_a_legal_transition_enters_the_state_at_period_0_and_each_other_is_a_fault_of_the_program(void)
@@ -135,6 +136,9 @@ void test_outputs_of_every_state(void)
 {
     EACH(state, rig_outputs) {
         uint16_t fault = (uint16_t)((state == (uint16_t)DRIVE_FAULT) ? FAULT_STALL : FAULT_NONE);
+        if (state == (uint16_t)DRIVE_BRAKE) { /* of STOP_MODE 2: test_stop_short.c */
+            continue;
+        }
         rig_closed(1, 8000);
         drive.periods = 0;
         drive.state = state;

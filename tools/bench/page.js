@@ -2,7 +2,7 @@
 (async () => {
   "use strict";
   const STATES = { CALIBRATE: "#e8e8e8", BOOTSTRAP: "#e3d9f0", CATCH: "#cdeaf0", ALIGN: "#fde7c3", RAMP: "#fff4b8", CLOSED: "#e0f3e0", STOPPING: "#d9e8f7",
-                   FAULT: "#f9d3d3" };
+                   FAULT: "#f9d3d3", BRAKE: "#d5d5f2" };
   const LANE = 18, LABELS = 110, POINTS = 1500; // px, px, pairs of points drawn at most
   const place = document.getElementById("curves");
   const pictures = JSON.parse(document.getElementById("pictures").textContent);

@@ -50,6 +50,10 @@
 /** What noise and dead time make of the d current's mean deviation. */
 #define PARAM_ID_OFF (PARAM_F(ID_OFF_NOISE) * PARAM_F(MAXIMUM_CURRENT_A) + PARAM_F(ID_OFF_DEAD) * PARAM_DEAD_TIME_V * PARAM_IU / (16.0F * PARAM_F(D_CURRCNTR_PTERM)))
 
+/** Speed below which the short-circuited winding takes at most MAXIMUM_CURRENT_A, Kphi n/sqrt(3) = R I, in counts (STOP_MODE 2). R stands for |Z|:
+ *  the current's first swing goes beyond what stays, by as much as w L takes off. */
+#define PARAM_BRAKE_COUNTS PARAM_MIN(SPEED_COUNTS(PARAM_F(MAXIMUM_CURRENT_A) * PARAM_F(MOTOR_RS_OHM) * PARAM_ERPM_PER_V), 32767.0F)
+
 /** The fields of drive_params_t that are the protection's, and the limits'. */
 #define PARAM_PROTECTION_INIT \
     .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \

@@ -20,7 +20,7 @@ static struct {
 
 /** What drives the bridge in each state. */
 static const uint16_t rig_outputs[DRIVE_STATE_COUNT] = {
-    OUTPUTS_OFF, OUTPUTS_OFF, OUTPUTS_BOOTSTRAP, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_OFF, OUTPUTS_OFF
+    OUTPUTS_OFF, OUTPUTS_OFF, OUTPUTS_BOOTSTRAP, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_PWM, OUTPUTS_OFF, OUTPUTS_OFF, OUTPUTS_OFF
 };
 
 /** State and fault after a period, and the outputs that go with the state. */
