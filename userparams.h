@@ -66,6 +66,7 @@
 #define REGEN_LIMIT_V 27.0          /* [V]             8 .. 90        braking current is reduced from here, to nothing 2 V higher */
 #define I2T_CURRENT_A 0             /* [A peak]        0 .. 20        current that the winding stands for ever; more only for a while; 0: no I2t */
 #define I2T_TIME_SEC 60             /* [s]             2 .. 1000      the winding's thermal time constant */
+#define SUPPLY_CURRENT_LIMIT_A 0    /* [A]             0 .. 20        what the running motor may draw from the supply, in the mean; 0: no limit of its own */
 
 /* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
 #define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 61 over the parameter set */
@@ -256,6 +257,7 @@
  *   overcurrent_q13                       3.8 A                7075  Q13 A                       +0.001 %  phase current that trips
  *   i2t_most_q25                            0 A^2                 0  Q25 A^2                        exact  heat that trips
  *   i2t_rate_q16                    0.0085333 1                 559  Q16 a step                  -0.043 %  what the heat follows in 512 ms
+ *   supply_limit_q13                        0 A                   0  Q13 A                          exact  what the supply gives, as a q current at the voltage circle; 0: no limit
  *   fieldweak.trim_max_q13                1.5 A                2793  Q13 A                       +0.010 %  most that the voltage feedback adds
  *   flux_brake_most_q13                2.6641 A                4960  Q13 A                       -0.000 %  most d current that burns the rotor's energy
  *   current_max_reciprocal               2.75 A                6554  2^25 / Q13                  +0.006 %  its reciprocal

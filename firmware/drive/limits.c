@@ -69,6 +69,35 @@ void limits_current(drive_run_t *run, const drive_params_t *p)
     c->iq_limit_q13 = limits_beside(p, (uint16_t)qm_abs(c->ref_q13.d));
 }
 
+current_q13_t limits_supply(drive_t *d, const drive_params_t *p)
+{
+    drive_control_t *c = &d->run.control;
+    const int16_t u = (int16_t)((c->ref_q13.q < 0) ? -c->v_q14.q : c->v_q14.q);
+    const int32_t left = qm_mulss(d->circle.limit_q14, p->supply_limit_q13) - qm_mulss(c->v_q14.d, c->ref_q13.d);
+    int16_t most = p->current_max_q13;
+    if (left <= 0) {
+        most = 0;
+    } else if (left < qm_mulss(u, most)) {
+        most = (int16_t)qm_divud((uint32_t)left, (uint16_t)u);
+    } else { /* more than the largest current */
+    }
+    c->supply_q13 = (int16_t)(c->supply_q13 + ((most - c->supply_q13 + 2) >> 2));
+    return c->supply_q13;
+}
+
+void limits_driving(drive_t *d, const drive_params_t *p)
+{
+    drive_control_t *c = &d->run.control;
+    if (p->supply_limit_q13 != 0) {
+        current_q13_t most = limits_supply(d, p);
+        c->limited_by = (uint16_t)LIMIT_NONE;
+        if (most < c->iq_limit_q13 && !limits_brakes(c->ref_q13.q, observer_speed(&d->run.observer))) {
+            c->iq_limit_q13 = most;
+            c->limited_by = (uint16_t)LIMIT_SUPPLY;
+        }
+    }
+}
+
 void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15)
 {
     int16_t over = (int16_t)(bus_q15 - p->bus_regen_q15);
@@ -94,14 +123,17 @@ static uint16_t limits_reached(int16_t x, int16_t limit)
     return (uint16_t)(qm_abs(x) >= (int16_t)(limit - (limit >> 5)));
 }
 
-/** What holds the q current: the bus if it brakes, else the current. */
-static uint16_t limits_current_reasons(const drive_control_t *c, speed_erpm_t speed)
+/** What holds the q current: the bus if it brakes, else the supply or the current. */
+static uint16_t limits_current_reasons(const drive_control_t *c, const drive_params_t *p, speed_erpm_t speed)
 {
     int16_t limit = c->iq_limit_q13;
     uint16_t reason = (uint16_t)LIMIT_CURRENT;
     if (limits_bus_is_narrower(c, speed)) {
         limit = c->brake_limit_q13;
         reason = (uint16_t)LIMIT_BRAKE;
+    } else if (p->supply_limit_q13 != 0 && c->limited_by != (uint16_t)LIMIT_NONE) {
+        reason = c->limited_by;
+    } else { /* the circle */
     }
     return (uint16_t)(limits_reached(c->ref_q13.q, limit) ? reason : 0u);
 }
@@ -126,7 +158,7 @@ static uint16_t limits_closed_loop_reasons(const drive_t *d, const drive_params_
     if (!mode_limit_reasons(d, p, &found)) {
         found = limits_ramp_reasons(d, p);
     }
-    found |= limits_current_reasons(c, observer_speed(&run->observer));
+    found |= limits_current_reasons(c, p, observer_speed(&run->observer));
     if (c->flux_brake_q13 > 0) {
         found |= (uint16_t)LIMIT_FLUX_BRAKING;
     }

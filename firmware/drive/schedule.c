@@ -80,6 +80,7 @@ static void limit_currents(drive_t *d, const drive_params_t *p, const drive_samp
         handover_decay(&d->run.handover);
     }
     limits_current(&d->run, p);
+    limits_driving(d, p);
 }
 
 /** In closed loop as limit_currents(); then what the running motor teaches. */

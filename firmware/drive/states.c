@@ -116,6 +116,9 @@ void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
     d->angle = 0;
     drive_update_model(run, p, p->end_erpm);
     run->control.iq_limit_q13 = p->current_max_q13;
+    if (p->supply_limit_q13 != 0) {
+        run->control.supply_q13 = p->current_max_q13;
+    }
     run->control.brake_limit_q13 = limits_asked_most(p);
     d->forced.speed_q10 = p->align_speed_q10;
     d->frame = trig_sincos(0);

@@ -25,7 +25,9 @@
     X(256, FLUX_BRAKING, "the bus takes no more braking current: flux braking turns the rotor's energy into heat in the winding, within MAXIMUM_CURRENT_A", \
       "nothing to do, but mind the winding's temperature where a heavy rotor is stopped again and again") \
     X(512, SWING, "the hand-over waits for a rotor that swings about the ramp's speed", \
-      "make tune with the load's inertia in the motor file; or raise LOCK_TIME, lower OPENLOOP_RAMPSPEED_INCREASERATE")
+      "make tune with the load's inertia in the motor file; or raise LOCK_TIME, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
+    X(1024, SUPPLY, "the q current is at what SUPPLY_CURRENT_LIMIT_A allows", \
+      "take load or speed off; raise SUPPLY_CURRENT_LIMIT_A if the supply gives more")
 
 #define DRIVE_LIMIT_ENUM(bit, name, cause, remedy) LIMIT_##name = (bit),
 
@@ -55,6 +57,14 @@ current_q13_t limits_beside(const drive_params_t *p, uint16_t other_q13);
 
 /** d current: what is left of the hand-over, the table with its trim or what is burnt, the rotor's probe; the q current gets the rest of the circle. */
 void limits_current(drive_run_t *run, const drive_params_t *p);
+
+/** The q current that the supply allows a driving motor: 3/2 (u_d i_d + u_q i_q) = V SUPPLY_CURRENT_LIMIT_A, what the board itself draws not counted.
+ *  It takes a quarter of its change a step, 3 ms in all: near standstill u_q is R i_q, and each step would overshoot by as much as it takes.
+ *  @return Q13, 0..current_max_q13 */
+current_q13_t limits_supply(drive_t *d, const drive_params_t *p);
+
+/** Narrows the q current's limit to what the supply allows, while the q current drives; braking has REGEN_LIMIT_V. After limits_current(). */
+void limits_driving(drive_t *d, const drive_params_t *p);
 
 /** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: a filter's lag would let the bus
  *  capacitor and this limit swing */

@@ -52,7 +52,8 @@
     X(UNDER_VOLTAGE_V, "V", 3, 55, FROM_BOARD, "bus below trips while running") \
     X(REGEN_LIMIT_V, "V", 8, 90, FROM_BOARD, "braking current is reduced from here, to nothing 2 V higher") \
     X(I2T_CURRENT_A, "A peak", 0, 20, FROM_MOTOR, "current that the winding stands for ever; more only for a while; 0: no I2t") \
-    X(I2T_TIME_SEC, "s", 2, 1000, FROM_MOTOR, "the winding's thermal time constant")
+    X(I2T_TIME_SEC, "s", 2, 1000, FROM_MOTOR, "the winding's thermal time constant") \
+    X(SUPPLY_CURRENT_LIMIT_A, "A", 0, 20, 0, "what the running motor may draw from the supply, in the mean; 0: no limit of its own")
 
 #define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h */ \
     X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000, FROM_TUNER, "both current loops") \
@@ -167,6 +168,9 @@
     X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     X(PARAM_F(I2T_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
       PARAM_NAMED(I2T_CURRENT_A) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A) ": a larger one never trips; 0: no I2t") \
+    X(PARAM_F(SUPPLY_CURRENT_LIMIT_A) == 0.0F || (PARAM_F(SUPPLY_CURRENT_LIMIT_A) >= 0.015625F * PARAM_F(MAXIMUM_CURRENT_A) \
+                                                  && PARAM_F(SUPPLY_CURRENT_LIMIT_A) <= PARAM_F(MAXIMUM_CURRENT_A)), \
+      PARAM_NAMED(SUPPLY_CURRENT_LIMIT_A) " must be 0, for no limit, or 1/64 to 1 of " PARAM_NAMED(MAXIMUM_CURRENT_A) ": the supply gives at most 0.87 of it") \
     X(PARAM_F(FW_TRIM_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
       PARAM_NAMED(FW_TRIM_CURRENT_A) " must not exceed " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     PARAM_RELATION_IDREF(X, 0) PARAM_RELATION_IDREF(X, 1) PARAM_RELATION_IDREF(X, 2) PARAM_RELATION_IDREF(X, 3) \

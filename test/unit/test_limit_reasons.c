@@ -50,7 +50,7 @@ void test_reasons_are_bits_of_their_own(void)
     TEST_ASSERT_EQUAL_HEX16(LIMIT_##name, (bit)); \
     all |= (bit);
     DRIVE_LIMIT_TABLE(ADD)
-    TEST_ASSERT_EQUAL_HEX16(1023, all);
+    TEST_ASSERT_EQUAL_HEX16(2047, all);
 }
 
 void test_drive_that_has_what_it_asks_for_has_no_reason(void)
@@ -87,6 +87,23 @@ void test_current_is_the_reason_from_one_32nd_below_its_limit(void)
         expect(LIMIT_CURRENT, "braking, and the bus would take more");
         drive.run.control.brake_limit_q13 = 3200;
         expect(LIMIT_CURRENT, "the bus takes as much");
+    }
+}
+
+void test_supply_is_the_reason_in_place_of_the_current_while_it_narrows_the_limit(void)
+{
+    drive_params_t supplied = params;
+    supplied.supply_limit_q13 = 1000;
+    EACH_FREE {
+        drive.run.control.iq_limit_q13 = 3200;
+        drive.run.control.ref_q13.q = (int16_t)(way * 3100);
+        drive.run.control.limited_by = LIMIT_SUPPLY;
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_SUPPLY, limits_reasons(&drive, &supplied));
+        drive.run.control.ref_q13.q = (int16_t)(way * 3099);
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_NONE, limits_reasons(&drive, &supplied));
+        drive.run.control.ref_q13.q = (int16_t)(way * 3100);
+        drive.run.control.limited_by = LIMIT_NONE;
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_CURRENT, limits_reasons(&drive, &supplied));
     }
 }
 

@@ -165,6 +165,77 @@ void test_braking_that_was_limited_leaves_nothing_behind(void)
     TEST_ASSERT_GREATER_THAN_INT16(0, drive.run.control.ref_q13.q);
 }
 
+/* ---- what the supply allows ---- */
+
+/** Limit after so many steps at these voltages and currents; 1 A of supply at 24 V, 24 W. */
+static int16_t supplied(uint16_t steps, int16_t direction, float v_d, float v_q, float i_d, float i_q)
+{
+    drive_control_t *c = &drive.run.control;
+    limited = params;
+    limited.supply_limit_q13 = CURRENT_Q13(2.0 / 1.7320508 / 0.936);
+    rig_closed(direction, (int16_t)(direction * 8000));
+    bus_update_voltage_limit(&drive, &limited);
+    c->v_q14.d = VOLTAGE_Q14(v_d);
+    c->v_q14.q = (int16_t)(direction * VOLTAGE_Q14(v_q));
+    c->ref_q13.d = CURRENT_Q13(i_d);
+    c->ref_q13.q = (int16_t)(direction * CURRENT_Q13(i_q));
+    c->supply_q13 = limited.current_max_q13;
+    while (steps-- != 0u) {
+        c->iq_limit_q13 = 5000;
+        limits_driving(&drive, &limited);
+    }
+    return c->iq_limit_q13;
+}
+
+void test_supply_current_leaves_the_q_current_that_takes_its_power_at_this_voltage(void)
+{
+    static const struct {
+        float v_d, v_q, i_d, iq_a;
+    } cases[] = { { 0.0F, 10.0F, 0.0F, 1.6F }, { 0.0F, 8.0F, 0.0F, 2.0F }, { -6.0F, 10.0F, -1.0F, 1.0F }, { -4.0F, 12.0F, -1.0F, 1.0F }, { -8.0F, 10.0F, -2.5F, 0.0F } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            int16_t limit_q13 = supplied(60, direction, cases[n].v_d, cases[n].v_q, cases[n].i_d, 0.5F);
+            TEST_ASSERT_INT16_WITHIN_MESSAGE(CURRENT_Q13(0.02), CURRENT_Q13(cases[n].iq_a), limit_q13, golden_row(n));
+            TEST_ASSERT_EQUAL_HEX16(LIMIT_SUPPLY, drive.run.control.limited_by);
+        }
+    }
+}
+
+void test_supply_that_gives_more_than_the_largest_current_takes_leaves_the_circle_alone(void)
+{
+    TEST_ASSERT_EQUAL_INT16(5000, supplied(60, 1, 0.0F, 5.0F, 0.0F, 0.5F));
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_NONE, drive.run.control.limited_by);
+    TEST_ASSERT_EQUAL_INT16(5000, supplied(60, 1, 0.0F, 0.0F, 0.0F, 0.5F));
+    TEST_ASSERT_EQUAL_INT16(5000, supplied(60, 1, 0.0F, -5.0F, 0.0F, 0.5F)); /* it gives back */
+}
+
+void test_supply_s_limit_leaves_braking_current_alone(void)
+{
+    EACH_DIRECTION(direction) {
+        TEST_ASSERT_EQUAL_INT16(5000, supplied(60, direction, 0.0F, 10.0F, 0.0F, -0.5F));
+    }
+}
+
+void test_supply_s_limit_comes_by_a_quarter_a_step_and_ends_where_it_should(void)
+{
+    int16_t end = supplied(60, 1, 0.0F, 10.0F, 0.0F, 0.5F);
+    TEST_ASSERT_INT16_WITHIN(2, (int16_t)(5120 - (5120 - end) / 4), supplied(1, 1, 0.0F, 10.0F, 0.0F, 0.5F));
+    drive.run.control.supply_q13 = 0;
+    for (uint16_t n = 0; n < 60u; n++) {
+        (void)limits_supply(&drive, &limited);
+    }
+    TEST_ASSERT_INT16_WITHIN(4, end, drive.run.control.supply_q13);
+}
+
+void test_without_a_supply_limit_nothing_is_narrowed(void)
+{
+    (void)supplied(0, 1, 0.0F, 10.0F, 0.0F, 0.5F);
+    drive.run.control.iq_limit_q13 = 5000;
+    limits_driving(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(5000, drive.run.control.iq_limit_q13);
+    TEST_ASSERT_EQUAL_INT16(0, params.supply_limit_q13);
+}
+
 /* ---- what the bus does not take ---- */
 
 static current_q13_t burnt_with(const drive_params_t *p, uint16_t steps, int16_t brake_limit_q13, int16_t iq_q13)

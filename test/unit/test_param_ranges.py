@@ -132,6 +132,8 @@ RELATIONS = {
     "Q_CURRENT_REF_OPENLOOP must be at most MAXIMUM_CURRENT_A": [case("Q_CURRENT_REF_OPENLOOP", "2.76", "2.75")],
     "MAXIMUM_CURRENT_A must be below OVER_CURRENT_THRESHOLD_A": [case("MAXIMUM_CURRENT_A", "3.8", "3.79")],
     "I2T_CURRENT_A must be at most MAXIMUM_CURRENT_A": [case("I2T_CURRENT_A", "2.76", "2.75")],
+    "SUPPLY_CURRENT_LIMIT_A must be 0, for no limit, or 1/64 to 1 of MAXIMUM_CURRENT_A": [
+        case("SUPPLY_CURRENT_LIMIT_A", "2.76", "2.75"), case("SUPPLY_CURRENT_LIMIT_A", "0.0429", "0.043"), case("SUPPLY_CURRENT_LIMIT_A", "0.01", "0")],
     "OVER_CURRENT_THRESHOLD_A must be at most 86.5 %": [case("OVER_CURRENT_THRESHOLD_A", "3.81", "3.8")],
     "MAXIMUM_CURRENT_A must be at least 6.3 %": [case("MAXIMUM_CURRENT_A", "0.277", "0.278")],
     "FW_TRIM_CURRENT_A must not exceed MAXIMUM_CURRENT_A": [case("FW_TRIM_CURRENT_A", "2.76", "2.75")],

@@ -54,10 +54,14 @@
  *  the current's first swing goes beyond what stays, by as much as w L takes off. */
 #define PARAM_BRAKE_COUNTS PARAM_MIN(SPEED_COUNTS(PARAM_F(MAXIMUM_CURRENT_A) * PARAM_F(MOTOR_RS_OHM) * PARAM_ERPM_PER_V), 32767.0F)
 
+/** Supply current as a q current at the voltage circle: V I = 3/2 u i with V = sqrt(3) u / top, top the highest duty. Q13 counts. */
+#define PARAM_SUPPLY_Q13 (2.0F * PARAM_F(SUPPLY_CURRENT_LIMIT_A) * PARAM_F(PWM_FULL_DUTY) / (PARAM_SQRT3 * PARAM_F(PWM_TOP_DUTY)))
+
 /** The fields of drive_params_t that are the protection's, and the limits'. */
 #define PARAM_PROTECTION_INIT \
     .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
     .flux_brake_most_q13 = PARAM_FLUX_BRAKES ? CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * (PARAM_F(1 << ASKED_LESS_SHIFT) - 1.0F) / PARAM_F(1 << ASKED_LESS_SHIFT)) : 0, \
+    .supply_limit_q13 = CURRENT_Q13(PARAM_SUPPLY_Q13), \
     .current_max_reciprocal = (uint16_t)(33554432.0F / (PARAM_F(MAXIMUM_CURRENT_A) / PARAM_F(NORM_CURRENT_CONST) / 4.0F) + 0.5F), \
     .overcurrent_q13 = CURRENT_Q13(OVER_CURRENT_THRESHOLD_A), \
     .i2t_most_q25 = (int32_t)CURRENT_Q13(I2T_CURRENT_A) * CURRENT_Q13(I2T_CURRENT_A) / 2, \
