@@ -63,6 +63,7 @@
 #define OVER_CURRENT_THRESHOLD_A 3.8 /* [A peak]        0.1 .. 40      any phase above trips at once; must lie inside the converter's range */
 #define OVER_VOLTAGE_V 34.0         /* [V]             9 .. 100       bus above trips */
 #define UNDER_VOLTAGE_V 12.0        /* [V]             3 .. 55        bus below trips while running */
+#define DERATE_BELOW_V 0            /* [V]             0 .. 60        bus below which the driving current is reduced, to a fifth of MAXIMUM_CURRENT_A at UNDER_VOLTAGE_V; 0: not */
 #define REGEN_LIMIT_V 27.0          /* [V]             8 .. 90        braking current is reduced from here, to nothing 2 V higher */
 #define I2T_CURRENT_A 0             /* [A peak]        0 .. 20        current that the winding stands for ever; more only for a while; 0: no I2t */
 #define I2T_TIME_SEC 60             /* [s]             2 .. 1000      the winding's thermal time constant */
@@ -258,6 +259,7 @@
  *   i2t_most_q25                            0 A^2                 0  Q25 A^2                        exact  heat that trips
  *   i2t_rate_q16                    0.0085333 1                 559  Q16 a step                  -0.043 %  what the heat follows in 512 ms
  *   supply_limit_q13                        0 A                   0  Q13 A                          exact  what the supply gives, as a q current at the voltage circle; 0: no limit
+ *   derate_per_bus_q8                       0 A/V                 0  Q8                             exact  driving current taken off a volt; 0: none
  *   fieldweak.trim_max_q13                1.5 A                2793  Q13 A                       +0.010 %  most that the voltage feedback adds
  *   flux_brake_most_q13                2.6641 A                4960  Q13 A                       -0.000 %  most d current that burns the rotor's energy
  *   current_max_reciprocal               2.75 A                6554  2^25 / Q13                  +0.006 %  its reciprocal

@@ -175,6 +175,7 @@ static void limits(void)
     FIELD(i2t_most_q25, (double)I2T_CURRENT_A * I2T_CURRENT_A, "A^2", 2.0 * q13_a * q13_a, "Q25 A^2", "heat that trips");
     FIELD(i2t_rate_q16, 0.512 / I2T_TIME_SEC, "1", 1.0 / 65536.0, "Q16 a step", "what the heat follows in 512 ms");
     FIELD(supply_limit_q13, PARAM_SUPPLY_Q13, "A", q13_a, "Q13 A", "what the supply gives, as a q current at the voltage circle; 0: no limit");
+    FIELD(derate_per_bus_q8, DERATE_BELOW_V ? 0.8 * most / (DERATE_BELOW_V - UNDER_VOLTAGE_V) : 0.0, "A/V", q13_a / bus / 256.0, "Q8", "driving current taken off a volt; 0: none");
     FIELD(fieldweak.trim_max_q13, FW_TRIM_CURRENT_A, "A", q13_a, "Q13 A", "most that the voltage feedback adds");
     FIELD(flux_brake_most_q13, PARAM_FLUX_BRAKES ? most * 31.0 / 32.0 : 0.0, "A", q13_a, "Q13 A", "most d current that burns the rotor's energy");
     FIELD(current_max_reciprocal, most, "A", most / (33554432.0 / (most / q13_a)), "2^25 / Q13", "its reciprocal");

@@ -85,16 +85,47 @@ current_q13_t limits_supply(drive_t *d, const drive_params_t *p)
     return c->supply_q13;
 }
 
+current_q13_t limits_derated(const drive_params_t *p, int16_t bus_q15)
+{
+    const int16_t above = (int16_t)(bus_q15 - p->bus_under_q15), least = (int16_t)(p->current_max_q13 / DERATE_LEAST);
+    int32_t most = least;
+    if (above > 0) {
+        most += qm_mulss(above, p->derate_per_bus_q8) >> 8;
+    }
+    return (int16_t)((most > p->current_max_q13) ? p->current_max_q13 : most);
+}
+
+/** 1 where a limit of the driving current is in use. */
+static uint16_t limits_drive_less(const drive_params_t *p)
+{
+    return (uint16_t)(p->supply_limit_q13 != 0 || p->derate_per_bus_q8 != 0);
+}
+
+/** Narrows the q current's limit for a reason. */
+static void limits_narrow(drive_control_t *c, current_q13_t most, limit_reason_t reason)
+{
+    if (most < c->iq_limit_q13) {
+        c->iq_limit_q13 = most;
+        c->limited_by = (uint16_t)reason;
+    }
+}
+
 void limits_driving(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
+    const uint16_t drives = (uint16_t)!limits_brakes(c->ref_q13.q, observer_speed(&d->run.observer));
+    if (!limits_drive_less(p)) {
+        return;
+    }
+    c->limited_by = (uint16_t)LIMIT_NONE;
     if (p->supply_limit_q13 != 0) {
         current_q13_t most = limits_supply(d, p);
-        c->limited_by = (uint16_t)LIMIT_NONE;
-        if (most < c->iq_limit_q13 && !limits_brakes(c->ref_q13.q, observer_speed(&d->run.observer))) {
-            c->iq_limit_q13 = most;
-            c->limited_by = (uint16_t)LIMIT_SUPPLY;
+        if (drives) {
+            limits_narrow(c, most, LIMIT_SUPPLY);
         }
+    }
+    if (p->derate_per_bus_q8 != 0 && drives) {
+        limits_narrow(c, limits_derated(p, qm_hi(d->bus_q31)), LIMIT_LOW_BUS);
     }
 }
 
@@ -131,7 +162,7 @@ static uint16_t limits_current_reasons(const drive_control_t *c, const drive_par
     if (limits_bus_is_narrower(c, speed)) {
         limit = c->brake_limit_q13;
         reason = (uint16_t)LIMIT_BRAKE;
-    } else if (p->supply_limit_q13 != 0 && c->limited_by != (uint16_t)LIMIT_NONE) {
+    } else if (limits_drive_less(p) && c->limited_by != (uint16_t)LIMIT_NONE) {
         reason = c->limited_by;
     } else { /* the circle */
     }

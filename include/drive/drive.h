@@ -45,6 +45,7 @@ struct drive_params {
     current_q13_t current_max_q13;      /**< MAXIMUM_CURRENT_A */
     current_q13_t flux_brake_most_q13;  /**< most d current that burns energy in the winding; 0 where that would be no gain */
     current_q13_t supply_limit_q13;     /**< SUPPLY_CURRENT_LIMIT_A as a q current at the voltage circle; 0: none */
+    int16_t derate_per_bus_q8;          /**< driving current per bus count below DERATE_BELOW_V, Q13 counts * 256; 0: none is taken off */
     uint16_t current_max_reciprocal;    /**< 2^25 / current_max: current * this >> 10 is a Q15 ratio */
     current_q13_t overcurrent_q13;      /**< OVER_CURRENT_THRESHOLD_A */
     int32_t i2t_most_q25;               /**< square of I2T_CURRENT_A; 0: no I2t */
@@ -95,7 +96,7 @@ typedef struct {
     uint16_t ramp_q16;             /**< what its last step left below a whole electrical rpm */
     uint16_t ramp_waits;           /**< 1: its last step waited for the motor */
     dq_t ref_q13;                  /**< current references */
-    current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2); of a driving current also what the supply allows */
+    current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2); of a driving current also what supply and bus allow */
     current_q13_t supply_q13;      /**< q current that the supply's limit allows, damped */
     uint16_t limited_by;           /**< the reason for an iq_limit_q13 below the circle, limit_reason_t */
     current_q13_t brake_limit_q13; /**< largest braking current, from the bus */

@@ -27,7 +27,9 @@
     X(512, SWING, "the hand-over waits for a rotor that swings about the ramp's speed", \
       "make tune with the load's inertia in the motor file; or raise LOCK_TIME, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
     X(1024, SUPPLY, "the q current is at what SUPPLY_CURRENT_LIMIT_A allows", \
-      "take load or speed off; raise SUPPLY_CURRENT_LIMIT_A if the supply gives more")
+      "take load or speed off; raise SUPPLY_CURRENT_LIMIT_A if the supply gives more") \
+    X(2048, LOW_BUS, "the bus is below DERATE_BELOW_V and the q current at what that leaves", \
+      "check the supply and its cable, or charge the battery; take load off")
 
 #define DRIVE_LIMIT_ENUM(bit, name, cause, remedy) LIMIT_##name = (bit),
 
@@ -63,7 +65,11 @@ void limits_current(drive_run_t *run, const drive_params_t *p);
  *  @return Q13, 0..current_max_q13 */
 current_q13_t limits_supply(drive_t *d, const drive_params_t *p);
 
-/** Narrows the q current's limit to what the supply allows, while the q current drives; braking has REGEN_LIMIT_V. After limits_current(). */
+/** Driving current at a low bus: MAXIMUM_CURRENT_A from DERATE_BELOW_V up, a fifth of it (DERATE_LEAST) at UNDER_VOLTAGE_V and below, linear between.
+ *  @param bus_q15 filtered @return Q13, current_max_q13 / 5..current_max_q13 */
+current_q13_t limits_derated(const drive_params_t *p, int16_t bus_q15);
+
+/** Narrows the q current's limit to what supply and bus allow, while the q current drives; braking has REGEN_LIMIT_V. After limits_current(). */
 void limits_driving(drive_t *d, const drive_params_t *p);
 
 /** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: a filter's lag would let the bus

@@ -50,6 +50,7 @@
     X(OVER_CURRENT_THRESHOLD_A, "A peak", 0.1, 40, FROM_TUNER, "any phase above trips at once; must lie inside the converter's range") \
     X(OVER_VOLTAGE_V, "V", 9, 100, FROM_BOARD, "bus above trips") \
     X(UNDER_VOLTAGE_V, "V", 3, 55, FROM_BOARD, "bus below trips while running") \
+    X(DERATE_BELOW_V, "V", 0, 60, 0, "bus below which the driving current is reduced, to a fifth of MAXIMUM_CURRENT_A at UNDER_VOLTAGE_V; 0: not") \
     X(REGEN_LIMIT_V, "V", 8, 90, FROM_BOARD, "braking current is reduced from here, to nothing 2 V higher") \
     X(I2T_CURRENT_A, "A peak", 0, 20, FROM_MOTOR, "current that the winding stands for ever; more only for a while; 0: no I2t") \
     X(I2T_TIME_SEC, "s", 2, 1000, FROM_MOTOR, "the winding's thermal time constant") \
@@ -182,6 +183,9 @@
 #define PARAM_RELATION_BUS(X) \
     X(OVER_VOLTAGE_V > NOMINAL_BUS_V, PARAM_NAMED(OVER_VOLTAGE_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(UNDER_VOLTAGE_V < NOMINAL_BUS_V, PARAM_NAMED(UNDER_VOLTAGE_V) " must be below " PARAM_NAMED(NOMINAL_BUS_V)) \
+    X(PARAM_F(DERATE_BELOW_V) == 0.0F || PARAM_F(DERATE_BELOW_V) >= PARAM_F(UNDER_VOLTAGE_V) + 1.0F, \
+      PARAM_NAMED(DERATE_BELOW_V) " must be 0, for no derating, or at least " PARAM_NAMED(UNDER_VOLTAGE_V) " + 1 V") \
+    X(PARAM_F(DERATE_BELOW_V) <= PARAM_F(NOMINAL_BUS_V), PARAM_NAMED(DERATE_BELOW_V) " must be at most " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(REGEN_LIMIT_V > NOMINAL_BUS_V, PARAM_NAMED(REGEN_LIMIT_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(PARAM_F(REGEN_LIMIT_V) + PARAM_F(BRAKE_BAND_V) <= PARAM_F(OVER_VOLTAGE_V), \
       PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V))

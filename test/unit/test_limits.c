@@ -227,6 +227,64 @@ void test_supply_s_limit_comes_by_a_quarter_a_step_and_ends_where_it_should(void
     TEST_ASSERT_INT16_WITHIN(4, end, drive.run.control.supply_q13);
 }
 
+/** Parameters that derate below 20 V; the trip is 12 V. */
+#undef DERATE_BELOW_V
+#define DERATE_BELOW_V 20
+static const drive_params_t derated = DRIVE_PARAMS_INIT;
+#undef DERATE_BELOW_V
+#define DERATE_BELOW_V 0
+
+void test_driving_current_falls_from_all_to_a_fifth_between_DERATE_BELOW_and_the_trip(void)
+{
+    static const struct {
+        float bus_v;
+        int16_t most_q13;
+    } cases[] = { { 30.0F, 5120 }, { 24.0F, 5120 }, { 20.0F, 5120 }, { 18.0F, 4096 }, { 16.0F, 3072 }, { 14.0F, 2048 }, { 12.0F, 1024 }, { 11.0F, 1024 }, { 0.0F, 1024 } };
+    EACH(n, cases) {
+        int16_t most_q13 = limits_derated(&derated, (int16_t)(cases[n].bus_v / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F));
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(5, cases[n].most_q13, most_q13, golden_row(n));
+    }
+}
+
+/** Limit of a circle of 5000 at this bus, with a q current in this direction of the rotor. */
+static int16_t derated_at(float bus_v, int16_t direction, int16_t iq_q13)
+{
+    drive_control_t *c = &drive.run.control;
+    rig_closed(direction, (int16_t)(direction * 8000));
+    drive.bus_q31 = (int32_t)(bus_v / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F) * 65536;
+    c->ref_q13.q = (int16_t)(direction * iq_q13);
+    c->iq_limit_q13 = 5000;
+    limits_driving(&drive, &derated);
+    return c->iq_limit_q13;
+}
+
+void test_low_bus_narrows_the_driving_current_alone_and_says_so(void)
+{
+    EACH_DIRECTION(direction) {
+        TEST_ASSERT_INT16_WITHIN(5, 2048, derated_at(14.0F, direction, 500));
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_LOW_BUS, drive.run.control.limited_by);
+        TEST_ASSERT_EQUAL_INT16(5000, derated_at(14.0F, direction, -500));
+        TEST_ASSERT_EQUAL_HEX16(LIMIT_NONE, drive.run.control.limited_by);
+        TEST_ASSERT_EQUAL_INT16(5000, derated_at(20.0F, direction, 500));
+    }
+}
+
+void test_the_narrower_of_supply_and_low_bus_counts(void)
+{
+    drive_params_t both = derated;
+    (void)supplied(60, 1, 0.0F, 10.0F, 0.0F, 0.5F); /* 1.6 A */
+    both.supply_limit_q13 = limited.supply_limit_q13;
+    drive.run.control.iq_limit_q13 = 5000;
+    drive.bus_q31 = (int32_t)(18.0F / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F) * 65536;
+    limits_driving(&drive, &both);
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_SUPPLY, drive.run.control.limited_by);
+    drive.run.control.iq_limit_q13 = 5000;
+    drive.bus_q31 = (int32_t)(13.0F / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F) * 65536;
+    limits_driving(&drive, &both);
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_LOW_BUS, drive.run.control.limited_by);
+    TEST_ASSERT_INT16_WITHIN(5, 1536, drive.run.control.iq_limit_q13);
+}
+
 void test_without_a_supply_limit_nothing_is_narrowed(void)
 {
     (void)supplied(0, 1, 0.0F, 10.0F, 0.0F, 0.5F);

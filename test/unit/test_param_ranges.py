@@ -148,6 +148,9 @@ RELATIONS = {
     "OVER_VOLTAGE_V must be at most 1.9 * NOMINAL_BUS_V": [case("OVER_VOLTAGE_V", "45.7", "45.5")],
     "UNDER_VOLTAGE_V must be below NOMINAL_BUS_V": [case("UNDER_VOLTAGE_V", "24.0", "23.9")],
     "UNDER_VOLTAGE_V must be at least 0.3 * NOMINAL_BUS_V": [case("UNDER_VOLTAGE_V", "7.1", "7.3")],
+    "DERATE_BELOW_V must be 0, for no derating, or at least UNDER_VOLTAGE_V + 1 V": [
+        case("DERATE_BELOW_V", "12.9", "13"), case("DERATE_BELOW_V", "0.1", "0"), case("UNDER_VOLTAGE_V", "18.1", "18", DERATE_BELOW_V="19")],
+    "DERATE_BELOW_V must be at most NOMINAL_BUS_V": [case("DERATE_BELOW_V", "24.1", "24")],
     "REGEN_LIMIT_V must be above NOMINAL_BUS_V": [case("REGEN_LIMIT_V", "24.0", "24.1")],
     "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V": [case("REGEN_LIMIT_V", "32.1", "31.9")],
     "UNDER_VOLTAGE_V is too low for the modulator's division": [case("LOOPTIME_SEC", "0.0002", "0.00014")],

@@ -57,11 +57,16 @@
 /** Supply current as a q current at the voltage circle: V I = 3/2 u i with V = sqrt(3) u / top, top the highest duty. Q13 counts. */
 #define PARAM_SUPPLY_Q13 (2.0F * PARAM_F(SUPPLY_CURRENT_LIMIT_A) * PARAM_F(PWM_FULL_DUTY) / (PARAM_SQRT3 * PARAM_F(PWM_TOP_DUTY)))
 
+/** Driving current that a count of bus takes off between DERATE_BELOW_V and the trip, Q13 counts * 256; 0: none. */
+#define PARAM_DERATE_BAND_V PARAM_MAX(PARAM_F(DERATE_BELOW_V) - PARAM_F(UNDER_VOLTAGE_V), 1.0F)
+#define PARAM_DERATE_Q8 ((DERATE_BELOW_V) ? 256.0F * (1.0F - 1.0F / PARAM_F(DERATE_LEAST)) * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(PARAM_DERATE_BAND_V)) : 0.0F)
+
 /** The fields of drive_params_t that are the protection's, and the limits'. */
 #define PARAM_PROTECTION_INIT \
     .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
     .flux_brake_most_q13 = PARAM_FLUX_BRAKES ? CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * (PARAM_F(1 << ASKED_LESS_SHIFT) - 1.0F) / PARAM_F(1 << ASKED_LESS_SHIFT)) : 0, \
     .supply_limit_q13 = CURRENT_Q13(PARAM_SUPPLY_Q13), \
+    .derate_per_bus_q8 = (int16_t)(PARAM_DERATE_Q8 + 0.5F), \
     .current_max_reciprocal = (uint16_t)(33554432.0F / (PARAM_F(MAXIMUM_CURRENT_A) / PARAM_F(NORM_CURRENT_CONST) / 4.0F) + 0.5F), \
     .overcurrent_q13 = CURRENT_Q13(OVER_CURRENT_THRESHOLD_A), \
     .i2t_most_q25 = (int32_t)CURRENT_Q13(I2T_CURRENT_A) * CURRENT_Q13(I2T_CURRENT_A) / 2, \
