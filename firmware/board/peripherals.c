@@ -99,7 +99,7 @@ void pwm_init(void)
     P1SECMP = BOARD_P1SECMP;
     IFS3bits.FLTA1IF = 0;
     IPC15bits.FLTA1IP = BOARD_PRIORITY_FAULT;
-    IEC3bits.FLTA1IE = 1;
+    IEC3bits.FLTA1IE = BOARD_FLTA_USED;
     P1TCON = BOARD_P1TCON;
 }
 

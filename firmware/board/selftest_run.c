@@ -73,7 +73,7 @@ static const written_t written[] = {
     { &PMD1, 0xFFFFu, 0u },
     /* interrupts: only the control interrupt, that of the slow work, and the fault input; the core */
     { &IEC0, 0xFFFFu, 0x2080u },
-    { &IEC3, 0xFFFFu, 0x8000u },
+    { &IEC3, 0xFFFFu, 0x8000u * BOARD_FLTA_USED },
     { &IPC1, 0x7000u, BOARD_PRIORITY_SLOW << 12 },
     { &IPC3, 0x0070u, BOARD_PRIORITY_CONTROL << 4 },
     { &IPC15, 0x7000u, BOARD_PRIORITY_FAULT << 12 },

@@ -63,9 +63,11 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 #define BOARD_P1TCON 0x8002u                                                  /* on, up/down counting */
 #define BOARD_PWM1CON1 0x0077u                                                /* pairs 1-3 enabled, complementary */
 #define BOARD_P1DTCON1 ((uint16_t)(0x0040u | (uint16_t)(DEAD_TIME_DUTY / 2))) /* unit A, two clocks a count */
-#define BOARD_P1FLTACON 0x0087u                                               /* FLTA: pairs 1-3 inactive, cycle by cycle */
-#define BOARD_FLTA_RP ((uint16_t)PIN_RP(BOARD_PIN_FAULT))
-#define BOARD_FLTA_LOW() PIN_LOW(BOARD_PIN_FAULT) /* the comparator holds the outputs off */
+/* Without the fault input no pair follows it, no interrupt comes, and its pin stays free. */
+#define BOARD_FLTA_USED ((FAULT_INPUT_USED) ? 1u : 0u)
+#define BOARD_P1FLTACON ((uint16_t)(0x0087u * BOARD_FLTA_USED)) /* FLTA: pairs 1-3 inactive, cycle by cycle */
+#define BOARD_FLTA_RP ((uint16_t)(BOARD_FLTA_USED ? (unsigned)PIN_RP(BOARD_PIN_FAULT) : 0x1Fu))
+#define BOARD_FLTA_LOW() (BOARD_FLTA_USED && PIN_LOW(BOARD_PIN_FAULT)) /* the comparator holds the outputs off */
 #define BOARD_OUTPUTS_OFF 0x0000u
 #define BOARD_OUTPUTS_BOOTSTRAP 0x0015u /* all low sides on */
 #define BOARD_OUTPUTS_PWM 0x3F00u

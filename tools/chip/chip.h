@@ -319,6 +319,7 @@ void chip_ports_hooks(chip_t *chip);
 void chip_ports_show(chip_t *chip);
 unsigned chip_ports_pin(const chip_t *chip, unsigned port, unsigned bit);
 bool chip_ports_fault(chip_t *chip);
+bool chip_ports_fault_used(chip_t *chip);
 enum { CHIP_FUNCTION_U1TX = 3 }; /* in RPORx */
 bool chip_ports_pin_has_function(const chip_t *chip, unsigned rp, unsigned function);
 bool chip_ports_have_function(const chip_t *chip, unsigned function);

@@ -54,11 +54,17 @@ unsigned chip_ports_pin(const chip_t *chip, unsigned port, unsigned bit)
     return (input != 0 ? (unsigned)level[port] : chip_get(chip, port_address[port] + LAT_BEHIND)) >> bit & 1u;
 }
 
+/* False where the firmware leaves the fault input alone on purpose: no pin, and no pair follows it. */
+bool chip_ports_fault_used(chip_t *chip)
+{
+    return (CHIP_REG(chip, RPINR12) & 0x1Fu) != RP_VSS || (CHIP_REG(chip, P1FLTACON) & 7u) != 0;
+}
+
 /* True if the PWM's fault input is low at this instant; RPINR12 chooses the pin. */
 bool chip_ports_fault(chip_t *chip)
 {
     unsigned rp = CHIP_REG(chip, RPINR12) & 0x1Fu;
-    if (rp != chip->board.fault_rp && chip->pwm.running) {
+    if (rp != chip->board.fault_rp && chip->pwm.running && chip_ports_fault_used(chip)) {
         chip_warn(chip, "RPINR12: FLTA1R is %u, the board's fault signal is on RP%u%s", rp, chip->board.fault_rp,
                   rp == RP_VSS ? "; tied to ground the input is always active" : "");
     }

@@ -158,7 +158,7 @@ static void warn_settings(chip_t *chip)
     if ((con1 & 0x700u) != 0) {
         chip_warn(chip, "PWM1CON1: PMODx makes a pair independent, both transistors switch together without dead time");
     }
-    if ((CHIP_REG(chip, P1FLTACON) & 7u) != 7u) {
+    if (chip_ports_fault_used(chip) && (CHIP_REG(chip, P1FLTACON) & 7u) != 7u) {
         chip_warn(chip, "P1FLTACON: FAENx is %u, the fault input does not switch off every pair", CHIP_REG(chip, P1FLTACON) & 7u);
     }
     if ((CHIP_REG(chip, P1FLTACON) & 0x3F00u) != 0) {

@@ -208,7 +208,7 @@ void bringup_step_fault_rest(bringup_guide_t *g, drive_t *d)
     } else if (g->blocked) {
         bringup_go(g, BRINGUP_STEP_LAST);
     } else {
-        bringup_go(g, BRINGUP_STEP_FAULT_INPUT);
+        bringup_go(g, (FAULT_INPUT_USED) ? BRINGUP_STEP_FAULT_INPUT : BRINGUP_STEP_CURRENT);
     }
 }
 
