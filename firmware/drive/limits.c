@@ -77,11 +77,14 @@ current_q13_t limits_supply(drive_t *d, const drive_params_t *p)
     int16_t most = p->current_max_q13;
     if (left <= 0) {
         most = 0;
-    } else if (left < qm_mulss(u, most)) {
-        most = (int16_t)qm_divud((uint32_t)left, (uint16_t)u);
+    } else if (u > 0 && left < qm_mulss(u, most)) {
+        uint16_t quotient = qm_divud((uint32_t)left, (uint16_t)u);
+        if (quotient < (uint16_t)most) { /* it is: the proof sees it here */
+            most = (int16_t)quotient;
+        }
     } else { /* more than the largest current */
     }
-    c->supply_q13 = (int16_t)(c->supply_q13 + ((most - c->supply_q13 + 2) >> 2));
+    c->supply_q13 = observer_between(c->supply_q13, most, SUPPLY_FOLLOWS_Q15);
     return c->supply_q13;
 }
 

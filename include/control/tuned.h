@@ -52,6 +52,7 @@
 #define FLUX_BRAKE_STEP_Q13 32     /* [Q13 A] a step of the d current that burns: MAXIMUM_CURRENT_A takes a twentieth of a second | run SCENARIO=stop_from_top */
 #define FLUX_BRAKE_DEAD_SHARE 0.5         /* [1] of dead time's voltage, which R at full current must exceed for d current to burn anything | catch */
 #define ASKED_LESS_SHIFT 5          /* [shift] of MAXIMUM_CURRENT_A 1/32 is left to what the current controllers overshoot | run SCENARIO=demo */
+#define SUPPLY_FOLLOWS_Q15 8192     /* [Q15] of its change that the q current for SUPPLY_CURRENT_LIMIT_A takes a step: a quarter | run SCENARIO=rated */
 #define DERATE_LEAST 5              /* [1] MAXIMUM_CURRENT_A over what DERATE_BELOW_V leaves of the driving current at UNDER_VOLTAGE_V | run SCENARIO=fault_undervoltage */
 #define BRAKE_BAND_V 2.0            /* [V] above REGEN_LIMIT_V, over which braking current falls to nothing | run SCENARIO=brake_without_sink */
 #define SALIENCE_LEAST_SHIFT 2      /* [shift] MTPA's d current follows in four steps of 16 periods | run MOTOR=ipm_4pp_24v_2000 */

@@ -169,6 +169,7 @@ static void any_control(drive_control_t *c)
     c->ref_q13.q = any((int16_t)-current_max, current_max);
     c->iq_limit_q13 = any(0, current_max);
     c->brake_limit_q13 = any(0, current_max);
+    c->supply_q13 = any(0, current_max);
     c->i_q13.d = any(-IQ_MAX, IQ_MAX);
     c->i_q13.q = any(-IQ_MAX, IQ_MAX);
     c->v_q14.d = any((int16_t)-(2 * voltage_max), 2 * voltage_max);
@@ -232,6 +233,7 @@ static void bounds_hold_again(void)
     //@ check ref: -current_max <= c->ref_q13.d <= current_max && -current_max <= c->ref_q13.q <= current_max;
     //@ check iq_limit: 0 <= c->iq_limit_q13 <= current_max;
     //@ check brake_limit: 0 <= c->brake_limit_q13 <= current_max;
+    //@ check supply: 0 <= c->supply_q13 <= current_max;
     //@ check align: 0 <= drive.run.align.mean_q14 && -32767 <= drive.run.align.least_q14 && -32767 <= drive.run.align.second_q14;
     //@ check handover: -current_max <= drive.run.handover.id_q13 <= current_max;
     //@ check v: -2 * voltage_max <= c->v_q14.d <= 2 * voltage_max && -2 * voltage_max <= c->v_q14.q <= 2 * voltage_max;

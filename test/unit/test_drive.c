@@ -187,7 +187,7 @@ void test_withdrawn_request_in_every_state(void)
 {
     static const uint16_t next[DRIVE_STATE_COUNT] = {
         DRIVE_CALIBRATE, DRIVE_STOPPED, DRIVE_STOPPED, DRIVE_STOPPED, DRIVE_STOPPED, DRIVE_STOPPING, DRIVE_STOPPING, DRIVE_FAULT,
-        DRIVE_STOPPED
+        DRIVE_STOPPED, DRIVE_STOPPED
     };
     EACH(state, next) {
         rig_closed(1, 8000);
