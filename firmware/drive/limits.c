@@ -72,15 +72,15 @@ void limits_current(drive_run_t *run, const drive_params_t *p)
 current_q13_t limits_supply(drive_t *d, const drive_params_t *p)
 {
     drive_control_t *c = &d->run.control;
-    const int16_t u = (int16_t)((c->ref_q13.q < 0) ? -c->v_q14.q : c->v_q14.q);
+    const voltage_q14_t driving_q14 = (int16_t)((c->ref_q13.q < 0) ? -c->v_q14.q : c->v_q14.q);
     const int32_t left = qm_mulss(d->circle.limit_q14, p->supply_limit_q13) - qm_mulss(c->v_q14.d, c->ref_q13.d);
     int16_t most = p->current_max_q13;
     if (left <= 0) {
         most = 0;
-    } else if (u > 0 && left < qm_mulss(u, most)) {
-        uint16_t quotient = qm_divud((uint32_t)left, (uint16_t)u);
-        if (quotient < (uint16_t)most) { /* it is: the proof sees it here */
-            most = (int16_t)quotient;
+    } else if (driving_q14 > 0 && left < qm_mulss(driving_q14, most)) {
+        uint16_t fits_q13 = qm_divud((uint32_t)left, (uint16_t)driving_q14);
+        if (fits_q13 < (uint16_t)most) { /* it is: the proof sees it here */
+            most = (int16_t)fits_q13;
         }
     } else { /* more than the largest current */
     }

@@ -38,12 +38,10 @@ void speed_reference_step(drive_t *d, const drive_params_t *p);
  *  innovation gate is open 7, 15, too. */
 void speed_follow(drive_run_t *run, const drive_params_t *p);
 
-/** What a stop does that is requested in closed loop (STOP_MODE). A target in the other direction always ramps down. */
-typedef enum {
-    STOP_RAMP,  /**< STOPPING: the reference ramps down, then the outputs go off */
-    STOP_COAST, /**< STOPPED: the outputs go off at once and the rotor runs out. Above the bus its back-EMF charges the bus, as after a fault */
-    STOP_SHORT  /**< STOPPING down to brake_erpm, then BRAKE: all low sides on until the rotor stands */
-} stop_mode_t;
+/* What a stop does that is requested in closed loop, STOP_MODE; with 0 the reference ramps down in STOPPING, then the outputs go off. A target in the
+ * other direction always ramps down. */
+#define STOP_COAST 1 /**< STOPPED: the outputs go off at once and the rotor runs out. Above the bus its back-EMF charges the bus, as after a fault */
+#define STOP_SHORT 2 /**< STOPPING down to PARAM_BRAKE_COUNTS, then BRAKE: all low sides on until the rotor stands */
 
 /** Whether the run goes on, slows down or ends: a requested stop does what STOP_MODE says, a target in the other direction slows down; a new request
  *  to run goes on from the present speed. Slot 6 in closed loop. */
