@@ -12,12 +12,6 @@ void panel_init(panel_t *panel)
     *panel = fresh;
 }
 
-/** low + (high - low) * fraction, the fraction in Q16. */
-static int16_t panel_between(app_range_t range, uint16_t fraction_q16)
-{
-    return (int16_t)(range.low + (int16_t)qm_mulhi_uu((uint16_t)(range.high - range.low), fraction_q16));
-}
-
 static void panel_buttons(panel_t *panel, const app_told_t *told, app_asks_t *asks)
 {
     if (button_pressed(&panel->s2, told->inputs & APP_S2, told->elapsed_ms)) {
@@ -59,7 +53,7 @@ void panel_tick(panel_t *panel, const app_told_t *told, app_asks_t *asks)
     } else { /* as a rule */
     }
     panel_buttons(panel, told, asks);
-    asks->target = (int16_t)(told->towards * panel_between(panel->fast_range ? told->fast : told->slow, told->pot_q16));
+    asks->target = (int16_t)(told->towards * app_between(panel->fast_range ? told->fast : told->slow, told->pot_q16));
     asks->outputs = panel_lights(panel, told);
     if (asks->fault != (uint16_t)FAULT_APPLICATION) {
         panel->kept = (int16_t)~panel->fast_range;

@@ -27,6 +27,29 @@
 /** The same of a speed that is no constant. @param rpm int16_t; times NOPOLESPAIRS within a word */
 #define APP_OF_RPM(rpm) ((int16_t)((int16_t)((rpm) * (int16_t)NOPOLESPAIRS) / (int16_t)SPEED_UNIT))
 
+/** Shaft rpm of a speed in counts. */
+QM_INLINE int16_t app_rpm_of(int16_t counts)
+{
+    uint32_t size = qm_muluu((uint16_t)qm_abs(counts), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
+    return qm_with_sign((int16_t)qm_divud((size < most) ? size : most, NOPOLESPAIRS), counts);
+}
+
+/** Where a value lies between two others: 0 at `from` and below, 65535 at `to` and above. */
+QM_INLINE uint16_t app_share(uint16_t value, uint16_t from, uint16_t to)
+{
+    if (value <= from) {
+        return 0;
+    }
+    return (value >= to) ? 65535u : qm_divud((uint32_t)(uint16_t)(value - from) << 16, (uint16_t)(to - from));
+}
+
+/** 1 for a fault that may pass by itself, so that another try is worth it; 0 where it would feed a short circuit again (drive/faults.h). */
+QM_INLINE uint16_t app_may_pass(uint16_t fault)
+{
+#define APP_PASSES(code, name, passes, decided_by, cause, remedy) || ((passes) && fault == (code))
+    return (uint16_t)(0 DRIVE_FAULT_TABLE(APP_PASSES));
+}
+
 /** Bits of app_told_t.inputs: on while the pin is on, as its row of the board file says. */
 enum {
     APP_S2 = 1, /**< button S2 is down */
@@ -43,6 +66,12 @@ enum {
 typedef struct {
     int16_t low, high;
 } app_range_t;
+
+/** Its value at a share of it, 0..65535 from low to high. */
+QM_INLINE int16_t app_between(app_range_t range, uint16_t share_q16)
+{
+    return (int16_t)(range.low + (int16_t)qm_mulhi_uu((uint16_t)(range.high - range.low), share_q16));
+}
 
 /** What the application is told. */
 typedef struct {

@@ -104,10 +104,10 @@ $X/foc33.hex: $X/foc33.elf
 	$(quiet)$(xc16)bin2hex $< -a -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16)) >$X/foc33.bin2hex 2>&1 || \
 	    { cat $X/foc33.bin2hex >&2; rm -f $@; exit 1; }
 
-# Another mode has its own tables and arrays, another level more code, another header its own motor: the budget is for the drive as it is delivered.
+# Another mode has its own tables and arrays, another level more code, another header its own motor, another application its own size: the budget is for the drive as it is delivered.
 target_modes = $(DEFINES)$(filter $(modes),$(shell sed -n 's/^ *# *define *\([A-Z_]*\).*/\1/p' $(call quoted,$(or $(USERPARAMS),.)/userparams.h) 2>/dev/null))
 target_header = $(shell cat $(call quoted,$(or $(USERPARAMS),.)/userparams.h) 2>/dev/null | cksum | cut -d ' ' -f 1)
-target_other = $(target_modes)$(filter-out -O2,$(OPT))$(if $(filter $(target_header),$(shell sed -n 's/^header_cksum = \([0-9]*\).*/\1/p' firmware/budget.toml)),,header)
+target_other = $(target_modes)$(filter-out -O2,$(OPT))$(if $(filter $(target_header),$(shell sed -n 's/^header_cksum = \([0-9]*\).*/\1/p' firmware/budget.toml)),,header)$(filter-out panel,$(APP))
 target_budget = $(if $(target_modes)$(filter-out -O2,$(OPT)),,--budget firmware/budget.toml $(if $(target_other),--other-header))
 target_check = $(python) -m tools.image.image $X/foc33.elf $X/foc33.hex --map $X/foc33.map --objdump $(call quoted,$(xc16)objdump) $(target_budget) $(if $(filter -O2,$(OPT)),--wcet)
 
