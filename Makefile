@@ -37,7 +37,7 @@ endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
 CFLAGS := -std=gnu99 -O2 -g -fPIC -fno-semantic-interposition -ftrack-macro-expansion=0 $(sanitizer)
 INCLUDES = $(if $(USERPARAMS),-I$B/header -I$(call quoted,$(USERPARAMS))) -Itools/cpu_host -Iinclude -I.
-compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES)
+compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES) $(app_wishes)
 
 # The virtual board: plant, chip, the board itself, and the processor that is the firmware built for the PC.
 board_rooms := $(addprefix tools/,plant chip vboard cpu_host)
@@ -66,6 +66,8 @@ quiet := $(if $(V),,@)
 say = $(if $(V),,@printf '  %-4s %s\n' $1 $2;)
 comma := ,
 quoted = '$(subst ','\'',$1)'
+# What an application asks of the board by what it includes.
+app_wishes := $(shell grep -qE '^ *$(hash) *include *"app/line\.h"' $(call quoted,$(or $(filter-out $(app_copy),$(app_source)),$(APP))) 2>/dev/null && echo -DAPP_SERIAL=1)
 # Writes the text to the target only if it is new, so that what depends on the target is made again only then.
 remember_lines = @mkdir -p $(@D); printf '%s\n' $1 | cmp -s - $@ || printf '%s\n' $1 >$@
 remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || printf '%s\n' $(call quoted,$1) >$@
@@ -280,10 +282,15 @@ $B/flags: FORCE $(if $(USERPARAMS),$B/header/userparams.h)
 	$(call remember,$(compile))
 
 apps = $(patsubst firmware/app/%.c,%,$(wildcard firmware/app/*.c))
+# Not for an application of firmware/app: what was built before may still name the copy.
 $(app_copy): FORCE
-	@test -f $(call quoted,$(APP)) || { echo foc33: no application, $(call quoted,APP=$(APP)): use one of $(apps) of firmware/app, or name a file >&2; exit 2; }
-	@mkdir -p $(@D); { printf '#line 1 "%s"\n' "$$(printf %s $(call quoted,$(APP)) | sed 's/[\\"]/\\&/g')"; cat $(call quoted,$(APP)); } >$@.new && \
-	    { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
+	$(if $(filter $@,$(app_source)),$(copy_app))
+
+define copy_app
+@test -f $(call quoted,$(APP)) || { echo foc33: no application, $(call quoted,APP=$(APP)): use one of $(apps) of firmware/app, or name a file >&2; exit 2; }
+@mkdir -p $(@D); { printf '#line 1 "%s"\n' "$$(printf %s $(call quoted,$(APP)) | sed 's/[\\"]/\\&/g')"; cat $(call quoted,$(APP)); } >$@.new && \
+    { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
+endef
 
 app_shown = $(if $(filter $(app_copy),$(app_source)),$(APP),$(app_source))
 # A unit of its own: its names are its own, and it links to what app.h has and to nothing else.

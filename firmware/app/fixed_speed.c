@@ -41,5 +41,5 @@ void app_ms(const app_told_t *told, app_asks_t *asks)
     }
     asks->run = (int16_t)(!has_fault && !told->is_remote); /* it starts again when a client has given the command back */
     asks->target = APP_RPM(FIXED_RPM);
-    asks->outputs = (uint16_t)((has_fault ? 0u : (uint16_t)APP_LED_ALIVE) | (told->is_running ? (uint16_t)APP_LED_RUN : 0u));
+    asks->outputs = app_lights(told);
 }

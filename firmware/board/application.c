@@ -2,6 +2,7 @@
 #include "board/application.h"
 
 #include "app/app.h"
+#include "board/app_line.h"
 #include "board/firmware.h"
 #include "board/mclv.h"
 #include "board/reset.h"
@@ -55,6 +56,10 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     asks->clear_fault = 0;
     asks->fault = (uint16_t)FAULT_NONE;
     asks->take_command = 0;
+#if APP_SERIAL
+    told->heard = app_line_heard();
+    asks->say = 0;
+#endif
 }
 
 /** A fault of the application's own. */
@@ -75,6 +80,9 @@ void application_tick(uint16_t elapsed_ms)
     application_runs = 1;
     app_ms(&told, &asks);
     application_runs = 0;
+#if APP_SERIAL
+    app_line_say(asks.say);
+#endif
     application_fault(asks.fault);
     asked.run = asks.run;
     asked.target = asks.target;

@@ -1,6 +1,7 @@
 /* The status line: composed in the background, sent a character a pass. */
 #include "board/status.h"
 
+#include "board/app_line.h"
 #include "board/scope.h"
 #include "board/modes/mode_board.h"
 #include "board/peripherals.h"
@@ -9,6 +10,10 @@
 #include "board/watch.h"
 #include "drive/limits.h"
 #include "version.h"
+
+#if SCOPE && APP_SERIAL
+#error foc33: an application with app/line.h has the serial line, and so has SCOPE: set SCOPE 0
+#endif
 
 #if SCOPE
 #define LINE_PLACE __attribute__((aligned(2))) /* a client's answers are words */
@@ -141,11 +146,12 @@ void status_init(void)
     *((board_reset_cause != 0u) ? put_reset() : sent_line) = '\0';
     line_next = 0;
     waited_ms = 0;
+    app_line_init();
 }
 
 void status_tick(uint16_t elapsed_ms)
 {
-    if (line_is_taken(elapsed_ms)) {
+    if (APP_SERIAL || line_is_taken(elapsed_ms)) {
         return;
     }
     waited_ms = (uint16_t)(waited_ms + elapsed_ms);
@@ -162,8 +168,10 @@ void status_send(void)
     if (line_serves_client()) {
         return;
     }
+    app_line_hear();
     if (sent_line[line_next] == '\0') {
-        *record_line(sent_line) = '\0';
+        char *end = app_line_next(sent_line);
+        *((end == sent_line) ? record_line(sent_line) : end) = '\0';
         line_next = 0;
     }
     if (sent_line[line_next] != '\0' && uart_send(sent_line[line_next])) {

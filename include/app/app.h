@@ -17,6 +17,15 @@
 
 #define APP_LATE_MS 20 /* a call that takes longer is late, [ms] */
 
+/** 1: the application has the serial line. The Makefile sets it for one that includes app/line.h. */
+#ifndef APP_SERIAL
+#define APP_SERIAL 0
+#endif
+#define APP_LINE_SIZE 64u /* of a line heard or said, with its end */
+
+/** Of a function of the firmware that an application calls. */
+#define APP_CALLS __attribute__((externally_visible))
+
 /** Counts of a speed, current or voltage that is a constant. A speed is electrical rpm in counts of SPEED_UNIT, a current full scale / 8192. */
 #define APP_RPM(rpm) ((int16_t)PARAM_ROUND(PARAM_F(rpm) * PARAM_F(NOPOLESPAIRS) / PARAM_F(SPEED_UNIT)))
 #define APP_AMPERE(ampere) ((int16_t)CURRENT_Q13(ampere))
@@ -91,6 +100,9 @@ typedef struct {
     uint16_t pot_is_lost; /**< 1: its signal is where no position is, POT_LIVE_ZERO */
     app_range_t slow;     /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
     app_range_t fast;     /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */
+#if APP_SERIAL
+    char *heard; /**< a line that has come, without its end; 0 without. Only for this call */
+#endif
 } app_told_t;
 
 /** What it asks for. Before the call it holds what stands; what the application does not change stays. */
@@ -101,7 +113,16 @@ typedef struct {
     uint16_t fault;        /**< a fault of the application's own: FAULT_POTENTIOMETER for a lost command signal, any other is FAULT_APPLICATION */
     uint16_t take_command; /**< 1: take command back from a client of the serial line */
     uint16_t outputs;      /**< bits APP_LED_ALIVE, ... */
+#if APP_SERIAL
+    const char *say; /**< a line to send, without its end; its text stays as it is for 20 ms. 0 without */
+#endif
 } app_asks_t;
+
+/** The plain lights: ALIVE unless there is a fault, RUN while the bridge conducts. @return for asks->outputs */
+QM_INLINE uint16_t app_lights(const app_told_t *told)
+{
+    return (uint16_t)(((told->fault == (uint16_t)FAULT_NONE) ? (uint16_t)APP_LED_ALIVE : 0u) | (told->is_running ? (uint16_t)APP_LED_RUN : 0u));
+}
 
 /** Once after a reset, before the outputs are on: the application's own variables begin anew. */
 void app_init(void);

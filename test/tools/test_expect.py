@@ -172,3 +172,10 @@ def test_an_order_that_takes_a_row_longer_is_not_outputs_on_again(order_rows, ok
     item.order_rows = order_rows
     found = next(outcome for outcome in report.check(item) if outcome.row == "stop: outputs off")
     assert (found.ok, "on again later" in found.got) == (ok, not ok)
+
+
+@pytest.mark.parametrize("sent, never, ok", [("foc33\r\nok run 1\r\n", False, True), ("foc33\r\n", False, False), ("foc33\r\n", True, True), ("ok run 1", True, False)])
+def test_a_text_is_looked_for_in_what_the_serial_line_has_sent(sent, never, ok):
+    done = run(expect("sent", text="ok run", never=never))
+    done.sent = sent
+    assert [outcome.ok for outcome in report.check(done)] == [ok]

@@ -164,3 +164,8 @@ def test_the_protocol_tells_speed_and_button_a_note_replaces_its_text_and_variab
     assert texts == ["S2 pressed", "potentiometer to 4000 rpm", "S3 pressed"]
     assert actions((0, "pot = 0.5\nnote = \"left\""))[0].text == "left"
     assert actions((0, "debug = { SnapStart = 1 }"))[0].variables == {"SnapStart": 1}
+
+
+def test_a_line_for_the_serial_line_is_sent_with_its_end_and_the_protocol_has_it():
+    found = actions((0.5, "send = \"run*69\""), (0.7, "send = \"stop*18\"\nnote = \"enough\""))
+    assert [(action.at_s, action.sends, action.text) for action in found] == [(0.5, "run*69\n", "serial line: run*69"), (0.7, "stop*18\n", "enough")]

@@ -415,6 +415,23 @@ class NoWarningsExpectation(Expectation):
 
 
 @dataclass(frozen=True)
+class SentExpectation(Expectation):
+    """kind `sent`: lines on the serial line."""
+
+    text: str
+    never: bool
+
+    @classmethod
+    def read(cls, section: Section, measures: dict[str, bool], duration_s: float) -> "SentExpectation":
+        return cls(section.text("text", meaning="what the firmware must have sent, anywhere in a line"),
+                   section.flag("never", False, "true: it must not"))
+
+    def check(self, run: Run) -> list[Outcome]:
+        found = self.text in run.sent
+        return [Outcome(f"sent: {self.text}", found != self.never, "sent" if found else "not sent", "never" if self.never else "sent")]
+
+
+@dataclass(frozen=True)
 class VariableExpectation(Expectation):
     """kind `variable`: a firmware variable at the end of the run."""
 
@@ -457,6 +474,7 @@ KINDS = {
     "no_fault": Kind("no fault", (NoFaultExpectation,)),
     "no_warnings": Kind("the virtual board found nothing wrong with the firmware's settings", (NoWarningsExpectation,)),
     "clean": Kind("no fault and no warnings", (NoFaultExpectation, NoWarningsExpectation)),
+    "sent": Kind("a text that the firmware has sent on its serial line", (SentExpectation,)),
     "variable": Kind("a firmware variable at the end", (VariableExpectation,))}
 
 

@@ -27,6 +27,8 @@ class Action:
     variables: dict[str, int] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
     text: str = ""
+    sends: str = ""
+    """for the firmware's serial line"""
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,8 @@ def _actions(event: Event, panel: _Panel) -> list[Action]:
         return [Action(event.at_s, {}, event.variables, text=event.note or f"debugger writes {text}")]
     if event.kind == "parameter": # those of time 0 are in place when the firmware begins: Job.parameters
         return [Action(event.at_s, parameters=event.parameters if event.at_s > 0.0 else {}, text=event.note or event.written)]
+    if event.kind == "send":
+        return [Action(event.at_s, sends=event.text + "\n", text=event.note or f"serial line: {event.text}")]
     try:
         if event.finds_range:
             panel.ranges.check_speed(event.value)

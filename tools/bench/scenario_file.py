@@ -25,7 +25,8 @@ EVENT_KINDS = {
     "torque_percent": "the brake `load.constant_nm` to this share of the rated torque",
     "debug": "writes 16-bit variables of the firmware, as a debugger would: `{ SnapStart = 1 }`",
     "parameter": "changes parameters of userparams.h, in a build with PARAMS_IN_RAM or TUNING; a list goes on with the table's next entries: "
-                 "`{ IDREF_SPEED5 = [-0.7, -0.8] }`"}
+                 "`{ IDREF_SPEED5 = [-0.7, -0.8] }`",
+    "send": "a line of text for the firmware's serial line, without its end"}
 """What an event does, and what docs/files.md says of it."""
 
 
@@ -125,7 +126,7 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
     meaning = EVENT_KINDS[kind]
     if hold_s is not None and kind != "press":
         raise section.fail("hold_s", f"'hold_s' with '{kind}'", "only press is held; remove it")
-    if over_s is not None and kind in ("start_rpm", "press", "debug", "parameter"):
+    if over_s is not None and kind in ("start_rpm", "press", "debug", "parameter", "send"):
         raise section.fail("over_s", f"'over_s' with '{kind}'", "only potentiometer and set can take time; remove it")
     event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0}
     if kind == "start_rpm":
@@ -139,6 +140,8 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
         event["variables"] = _variables(section, kind, meaning)
     elif kind == "parameter":
         event["parameters"], event["written"] = _parameters(section, kind, meaning)
+    elif kind == "send":
+        event["text"] = section.text(kind, meaning=meaning)
     elif kind == "speed":
         event["text"] = section.choice(kind, SPEEDS, meaning=meaning)
     else:

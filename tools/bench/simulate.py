@@ -228,6 +228,8 @@ def _act(board: Any, action: panel.Action, done: list[tuple[float, str]]) -> Non
         board.write_variable(name, value)
     for name, value in action.parameters.items():
         board.write_parameter(name, value)
+    if action.sends:
+        board.uart_send(action.sends)
     if action.text:
         done.append((action.at_s, action.text))
 

@@ -44,14 +44,14 @@ class Parts:
 
 
 def parts(motor: str | None = None, board: str | None = None, defines: str = "", userparams: str | None = None, cpu: str = "host",
-          image: Path | None = None) -> Parts:
-    """The parts by their names on the command line; builds the firmware with its scope."""
+          image: Path | None = None, app: str = "") -> Parts:
+    """The parts by their names on the command line; builds the firmware with its scope, or with an application, which may want the line."""
     options = argparse.Namespace(motor=motor, board=board, userparams=userparams)
     motor_part, board_part = command_common.parts_of(REST, options)
     header = command_common.header_for(options)
     folder = None if header is None else build.header_folder(header)
     macros = command_common.macros(defines)
-    macros += [] if SCOPE in macros else [SCOPE]
+    macros += [build.app(app, "APP")] if app else [] if SCOPE in macros else [SCOPE]
     if cpu == "33f":
         elf = pil_command.image_for(macros, folder, image)
         return Parts(motor_part, board_part, pil.library(macros, folder), elf, plain_elf.write(elf, elf.with_suffix(".client.elf")))
@@ -110,6 +110,7 @@ def _arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--board", help="board file instead of the motor's: a name in tuning/boards or a path")
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
+    parser.add_argument("--app", default="", help="application: a name of firmware/app or a path; the line is then without the scope")
     parser.add_argument("--cpu", choices=("host", "33f"), default="host", help="33f: an image of XC16 in the instruction-set simulator")
     parser.add_argument("--image", type=Path, help="its ELF file; default: built with XC16")
     return parser.parse_args(arguments)

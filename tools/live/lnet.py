@@ -143,12 +143,13 @@ class Decoder:
 
 def connect(port: str | Stream) -> "Lnet":
     """A link to the firmware behind a serial port's name or a stream; it has answered."""
-    link = Lnet(_open(port) if isinstance(port, str) else port)
+    link = Lnet(open_port(port) if isinstance(port, str) else port)
     link.device_info()
     return link
 
 
-def _open(port: str) -> Stream:
+def open_port(port: str) -> Stream:
+    """A serial port by its name, for this program alone."""
     try:
         import serial
     except ImportError:

@@ -30,7 +30,7 @@ target_warnings := -Wall -Wextra -Werror -pedantic -Wconversion -Wsign-conversio
     -Wstrict-prototypes -Wmissing-prototypes -Wredundant-decls -Wswitch-enum -Wswitch-default -Wfloat-equal -Wdouble-promotion -Wlogical-op \
     -Wvla -Winline -Wtype-limits -Wframe-larger-than=128
 target_part = -mcpu=$(target_device) -omf=elf $(if $(DFP),-mdfp=$(call quoted,$(DFP)/xc16)) $(if $(filter xc-dsc-,$(xc_names)),-U__XC16__ -D__XC16__)
-target_compile = $(xc16)gcc $(target_part) $(target_flags) $(target_warnings) $(target_includes) $(DEFINES)
+target_compile = $(xc16)gcc $(target_part) $(target_flags) $(target_warnings) $(target_includes) $(DEFINES) $(app_wishes)
 target_link_options := --gc-sections,--report-mem
 target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 

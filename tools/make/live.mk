@@ -13,10 +13,11 @@ live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make
 live-library:
 	$(call build,$(addprefix $B/,libvboard.so foc33.elf))
 
-live-board: setup-scope ## [run] the virtual board in real time, its serial line with the scope a pseudo-terminal [MOTOR= BOARD= DEFINES= USERPARAMS= CPU=33f IMAGE=file]
+live-board: setup-scope ## [run] the virtual board in real time, its serial line with the scope a pseudo-terminal [MOTOR= BOARD= DEFINES= APP=name USERPARAMS= CPU=33f IMAGE=file]
 	@$(if $(CPU),$(if $(filter 33f host,$(CPU)),,echo foc33: no processor $(call quoted,CPU=$(CPU)): use 33f or host >&2; exit 2))
 	@+$(tuned)
-	@$(alone) $(python) -m tools.live.board $(if $(CPU),--cpu $(CPU)) $(if $(IMAGE),--image $(call quoted,$(IMAGE))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(what)
+	@$(alone) $(python) -m tools.live.board $(if $(CPU),--cpu $(CPU)) $(if $(IMAGE),--image $(call quoted,$(IMAGE))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) \
+	    $(if $(APP),--app $(call quoted,$(APP))) $(what)
 
 setup-scope:
 	@tools/setup/prepare.sh scope

@@ -1,0 +1,82 @@
+"""The client of the application `text`: checksums, answers, what is said again, and a motor on the virtual board's serial line."""
+
+import pytest
+
+from tools.common.errors import UserError
+from tools.live import board, text
+
+
+class Answers:
+    """A stream with prepared answers, one for each line that is said."""
+
+    def __init__(self, *answers):
+        self.answers, self.said, self.waiting = list(answers), [], b""
+
+    def write(self, data):
+        self.said.append(data.decode())
+        self.waiting += self.answers.pop(0).encode() if self.answers else b""
+
+    def read(self, size):
+        data, self.waiting = self.waiting[:size], self.waiting[size:]
+        return data
+
+
+def answer(line):
+    return text.checked(line) + "\r\n"
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch):
+    monkeypatch.setattr(text, "ANSWER_S", 0.02)
+
+
+@pytest.mark.parametrize("line, checked", [("run", "run*69"), ("stop", "stop*18"), ("speed 1500", "speed 1500*43"), ("status", "status*14")])
+def test_checksum_is_that_of_nmea_0183(line, checked):
+    assert text.checked(line) == checked and text.content(checked) == line
+
+
+@pytest.mark.parametrize("line", ["", "run", "run*", "run*68", "run*6", "*00", "row 3 -12 5", "r\xfcn*69"])
+def test_a_line_without_a_right_checksum_says_nothing(line):
+    assert text.content(line) is None
+
+
+def test_an_answer_tells_what_the_drive_does():
+    stream = Answers(answer("ok run 1 speed -1498 fault NONE"))
+    assert text.TextDrive(stream).command("status") == text.Status(True, -1498, "NONE") and stream.said == ["status*14\n"]
+
+
+def test_what_was_disturbed_is_said_again():
+    stream = Answers("", "ok run 0 sp%ed 0 fault NONE*6A\r\n", answer("ok run 0 speed 0 fault NONE"))
+    assert text.TextDrive(stream).command("stop") == text.Status(False, 0, "NONE") and stream.said == ["stop*18\n"] * 3
+
+
+def test_lines_of_the_fault_recorder_in_between_are_passed_over():
+    stream = Answers("row 3 1 2 3\r\n" + answer("ok run 0 speed 0 fault STALL"))
+    assert text.TextDrive(stream).command("status").fault == "STALL"
+
+
+@pytest.mark.parametrize("word, remedy", [("range", "MINIMUM_SPEED_RPM"), ("refused", "clear the fault")])
+def test_a_refusal_names_the_remedy(word, remedy):
+    with pytest.raises(UserError, match=remedy):
+        text.TextDrive(Answers(answer(f"{word} run 0 speed 0 fault STALL"))).command("run")
+
+
+def test_silence_names_what_to_look_at():
+    with pytest.raises(UserError, match="APP=text"):
+        text.TextDrive(Answers()).command("status")
+
+
+def test_the_client_turns_a_motor_of_the_virtual_board(monkeypatch):
+    monkeypatch.setattr(text, "ANSWER_S", 2.0)
+    made_of = board.parts(app="text")
+    live = board.LiveBoard(made_of)
+    drive = text.TextDrive(board.BoardStream(live))
+    drive.command("speed 1500")
+    drive.command("run")
+    for _ in range(5):
+        live.run(0.5)
+        status = drive.command("status")
+    assert status.running and status.speed_rpm == pytest.approx(1500, abs=20) and status.fault == "NONE"
+    live.run(3.5) # nobody speaks: it stops
+    assert drive.command("status") == text.Status(False, 0, "NONE")
+    live.close()
