@@ -36,7 +36,7 @@ static const char *obey(const char *line, const app_told_t *told, app_asks_t *as
     return "ok";
 }
 
-/** The answer to a line: "ok run 1 speed 1498 fault NONE*3C". */
+/** The answer to a line: "ok run 1 speed 1498 fault NONE*5F". */
 static void reply(char *line, const app_told_t *told, app_asks_t *asks)
 {
     const uint16_t is_right = line_is_right(line);

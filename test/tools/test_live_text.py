@@ -1,8 +1,11 @@
-"""The client of the application `text`: checksums, answers, what is said again, and a motor on the virtual board's serial line."""
+"""The application's page, and the client of the application `text`: checksums, answers, what is said again, and a motor on the virtual board's serial line."""
+
+import re
 
 import pytest
 
 from tools.common.errors import UserError
+from tools.common.paths import ROOT
 from tools.live import board, text
 
 
@@ -80,3 +83,18 @@ def test_the_client_turns_a_motor_of_the_virtual_board(monkeypatch):
     live.run(3.5) # nobody speaks: it stops
     assert drive.command("status") == text.Status(False, 0, "NONE")
     live.close()
+
+
+def test_the_page_shows_the_example_and_lines_with_right_checksums():
+    page = (ROOT / "docs" / "application.md").read_text(encoding="utf-8")
+    assert (ROOT / "examples" / "my_app.c").read_text(encoding="utf-8") in page
+    lines = re.findall(r"`([^`]*\*[0-9A-F]{2})`", page)
+    assert len(lines) >= 6 and [line for line in lines if text.content(line) is None] == []
+
+
+@pytest.mark.parametrize("name", ["panel", "fixed_speed", "analog", "fan", "text"])
+def test_the_page_tells_how_long_each_application_is(name):
+    page = (ROOT / "docs" / "application.md").read_text(encoding="utf-8")
+    count = len((ROOT / "firmware" / "app" / f"{name}.c").read_text(encoding="utf-8").splitlines())
+    assert re.search(rf"^\| `{name}` \| .* \| (\d+) \|", page, re.MULTILINE)[1] == str(count)
+    assert name == "panel" or count <= 60

@@ -202,6 +202,7 @@ def test_the_scenario_is_named_like_its_mode_and_other_macros_go_to_the_usual_on
     item, more = scenario_for("--defines=-DPARAMS_IN_RAM -DSPEEDCNTR_PTERM=300")
     assert (item.name, more) == ("demo", ["PARAMS_IN_RAM", "SPEEDCNTR_PTERM=300"])
     assert [scenario_for(*words)[0].name for words in ([], ["--motor", "linix_45zwn24_40"])] == ["demo", "rated"]
+    assert [scenario_for("--app", name)[0].name for name in ("fan", "panel", "examples/my_app.c")] == ["app_fan", "demo", "app_any"]
     refusal(lambda: scenario_for("--defines=-DTORQUE_MODE -DTUNING"), "no scenario is for TORQUE_MODE with TUNING, DEFINES: name the one to run")
 
 
