@@ -18,20 +18,20 @@ void app_init(void)
 static const char *obey(const char *line, const app_told_t *told, app_asks_t *asks)
 {
     int16_t rpm;
-    if (line_number(line, "speed", &rpm)) {
+    if (app_line_number(line, "speed", &rpm)) {
         if (qm_abs(rpm) < app_rpm_of(told->slow.low) || qm_abs(rpm) > app_rpm_of(told->fast.high)) {
             return "range";
         }
         target = APP_OF_RPM(rpm);
-    } else if (line_is(line, "run")) {
+    } else if (app_line_is(line, "run")) {
         asks->run = 1; /* not in a fault: app_ms() */
         return told->fault ? "refused" : "ok";
-    } else if (line_is(line, "stop")) {
+    } else if (app_line_is(line, "stop")) {
         asks->run = 0;
-    } else if (line_is(line, "clear")) {
+    } else if (app_line_is(line, "clear")) {
         asks->clear_fault = 1;
     } else {
-        return line_is(line, "status") ? "ok" : "unknown";
+        return app_line_is(line, "status") ? "ok" : "unknown";
     }
     return "ok";
 }
@@ -39,11 +39,11 @@ static const char *obey(const char *line, const app_told_t *told, app_asks_t *as
 /** The answer to a line: "ok run 1 speed 1498 fault NONE*5F". */
 static void reply(char *line, const app_told_t *told, app_asks_t *asks)
 {
-    const uint16_t is_right = line_is_right(line);
-    char *at = line_put(answer, is_right ? obey(line, told, asks) : "checksum");
+    const uint16_t is_right = app_line_is_right(line);
+    char *at = app_line_put(answer, is_right ? obey(line, told, asks) : "checksum");
     silent_ms = is_right ? 0 : silent_ms;
-    at = line_put_number(line_put_number(at, " run ", (int16_t)told->is_running), " speed ", app_rpm_of(told->speed));
-    line_end(answer, line_put_fault(at, " fault ", told->fault));
+    at = app_line_put_number(app_line_put_number(at, " run ", (int16_t)told->is_running), " speed ", app_rpm_of(told->speed));
+    app_line_end(answer, app_line_put_fault(at, " fault ", told->fault));
     asks->say = answer;
 }
 

@@ -2,7 +2,7 @@
 #include "board/application.h"
 
 #include "app/app.h"
-#include "board/app_line.h"
+#include "board/app_calls.h"
 #include "board/firmware.h"
 #include "board/mclv.h"
 #include "board/reset.h"

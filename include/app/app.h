@@ -37,27 +37,13 @@
 #define APP_OF_RPM(rpm) ((int16_t)((int16_t)((rpm) * (int16_t)NOPOLESPAIRS) / (int16_t)SPEED_UNIT))
 
 /** Shaft rpm of a speed in counts. */
-QM_INLINE int16_t app_rpm_of(int16_t counts)
-{
-    uint32_t size = qm_muluu((uint16_t)qm_abs(counts), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
-    return qm_with_sign((int16_t)qm_divud((size < most) ? size : most, NOPOLESPAIRS), counts);
-}
+int16_t app_rpm_of(int16_t counts) APP_CALLS;
 
 /** Where a value lies between two others: 0 at `from` and below, 65535 at `to` and above. */
-QM_INLINE uint16_t app_share(uint16_t value, uint16_t from, uint16_t to)
-{
-    if (value <= from) {
-        return 0;
-    }
-    return (value >= to) ? 65535u : qm_divud((uint32_t)(uint16_t)(value - from) << 16, (uint16_t)(to - from));
-}
+uint16_t app_share(uint16_t value, uint16_t from, uint16_t to) APP_CALLS;
 
 /** 1 for a fault that may pass by itself, so that another try is worth it; 0 where it would feed a short circuit again (drive/faults.h). */
-QM_INLINE uint16_t app_may_pass(uint16_t fault)
-{
-#define APP_PASSES(code, name, passes, decided_by, cause, remedy) || ((passes) && fault == (code))
-    return (uint16_t)(0 DRIVE_FAULT_TABLE(APP_PASSES));
-}
+uint16_t app_may_pass(uint16_t fault) APP_CALLS;
 
 /** Bits of app_told_t.inputs: on while the pin is on, as its row of the board file says. */
 enum {
@@ -77,10 +63,7 @@ typedef struct {
 } app_range_t;
 
 /** Its value at a share of it, 0..65535 from low to high. */
-QM_INLINE int16_t app_between(app_range_t range, uint16_t share_q16)
-{
-    return (int16_t)(range.low + (int16_t)qm_mulhi_uu((uint16_t)(range.high - range.low), share_q16));
-}
+int16_t app_between(app_range_t range, uint16_t share_q16) APP_CALLS;
 
 /** What the application is told. */
 typedef struct {
@@ -119,10 +102,7 @@ typedef struct {
 } app_asks_t;
 
 /** The plain lights: ALIVE unless there is a fault, RUN while the bridge conducts. @return for asks->outputs */
-QM_INLINE uint16_t app_lights(const app_told_t *told)
-{
-    return (uint16_t)(((told->fault == (uint16_t)FAULT_NONE) ? (uint16_t)APP_LED_ALIVE : 0u) | (told->is_running ? (uint16_t)APP_LED_RUN : 0u));
-}
+uint16_t app_lights(const app_told_t *told) APP_CALLS;
 
 /** Once after a reset, before the outputs are on: the application's own variables begin anew. */
 void app_init(void);

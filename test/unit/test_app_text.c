@@ -1,6 +1,6 @@
 /* defines: -DAPP_SERIAL=1 */
 /* The application text: what each line does, what is answered, and what happens when the lines stay away. With the board's part of the line. */
-#include "firmware/board/app_line.c"
+#include "firmware/board/app_calls.c"
 
 #include "firmware/app/text.c"
 

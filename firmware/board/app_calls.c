@@ -1,10 +1,41 @@
-/* The serial line of an application that has it: lines heard and said, words, whole numbers, the checksum. Empty where APP_SERIAL is 0. */
-#include "board/app_line.h"
+/* What an application calls: shares, units, lights; and, where APP_SERIAL is 1, the serial line: lines heard and said, words, numbers, the checksum.
+ * The linker drops what it does not call. */
+#include "board/app_calls.h"
 
 #include "app/line.h"
 #include "board/peripherals.h"
 #include "board/reset.h"
 #include "board/status.h"
+
+int16_t app_rpm_of(int16_t counts)
+{
+    uint32_t size = qm_muluu((uint16_t)qm_abs(counts), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
+    return qm_with_sign((int16_t)qm_divud((size < most) ? size : most, NOPOLESPAIRS), counts);
+}
+
+uint16_t app_share(uint16_t value, uint16_t from, uint16_t to)
+{
+    if (value <= from) {
+        return 0;
+    }
+    return (value >= to) ? 65535u : qm_divud((uint32_t)(uint16_t)(value - from) << 16, (uint16_t)(to - from));
+}
+
+uint16_t app_may_pass(uint16_t fault)
+{
+#define APP_PASSES(code, name, passes, decided_by, cause, remedy) || ((passes) && fault == (code))
+    return (uint16_t)(0 DRIVE_FAULT_TABLE(APP_PASSES));
+}
+
+int16_t app_between(app_range_t range, uint16_t share_q16)
+{
+    return (int16_t)(range.low + (int16_t)qm_mulhi_uu((uint16_t)(range.high - range.low), share_q16));
+}
+
+uint16_t app_lights(const app_told_t *told)
+{
+    return (uint16_t)(((told->fault == (uint16_t)FAULT_NONE) ? (uint16_t)APP_LED_ALIVE : 0u) | (told->is_running ? (uint16_t)APP_LED_RUN : 0u));
+}
 
 #if APP_SERIAL
 
@@ -60,7 +91,7 @@ char *app_line_next(char *line)
     return text_end(&line[n]);
 }
 
-/* ---- what the application calls ---- */
+/* ---- the serial line: what the application calls ---- */
 
 /** The checksum's digit. */
 static char digit_of(uint16_t value)
@@ -80,7 +111,7 @@ static uint16_t check_of(const char *line, const char *end)
     return sum;
 }
 
-uint16_t line_is_right(char *line)
+uint16_t app_line_is_right(char *line)
 {
     char *end = line;
     uint16_t sum;
@@ -107,13 +138,13 @@ static const char *line_after(const char *line, const char *word)
     return at;
 }
 
-uint16_t line_is(const char *line, const char *word)
+uint16_t app_line_is(const char *line, const char *word)
 {
     const char *rest = line_after(line, word);
     return (uint16_t)(rest != 0 && *rest == '\0');
 }
 
-uint16_t line_number(const char *line, const char *word, int16_t *number)
+uint16_t app_line_number(const char *line, const char *word, int16_t *number)
 {
     const char *at = line_after(line, word);
     uint16_t size = 0, is_negative;
@@ -133,22 +164,22 @@ uint16_t line_number(const char *line, const char *word, int16_t *number)
     return 1;
 }
 
-char *line_put(char *at, const char *text)
+char *app_line_put(char *at, const char *text)
 {
     return text_put(at, text);
 }
 
-char *line_put_number(char *at, const char *text, int16_t number)
+char *app_line_put_number(char *at, const char *text, int16_t number)
 {
     return text_put_named(at, text, number);
 }
 
-char *line_put_fault(char *at, const char *text, uint16_t fault)
+char *app_line_put_fault(char *at, const char *text, uint16_t fault)
 {
     return text_put_fault(at, text, fault);
 }
 
-void line_end(const char *line, char *end)
+void app_line_end(const char *line, char *end)
 {
     const uint16_t sum = check_of(line, end);
     end[0] = '*';

@@ -1,6 +1,6 @@
-/* The serial line of an application that has it (app/line.h): what has come, and what is to be said. Nothing where APP_SERIAL is 0. */
-#ifndef BOARD_APP_LINE_H
-#define BOARD_APP_LINE_H
+/* What an application calls, as the board sees it: the serial line of one that has it (app/line.h). Nothing where APP_SERIAL is 0. */
+#ifndef BOARD_APP_CALLS_H
+#define BOARD_APP_CALLS_H
 
 #include "app/app.h"
 
