@@ -1,5 +1,5 @@
 /* Every source of the firmware as one unit, as make firmware compiles them (-fwhole-program); written by make project. */
-#include "firmware/board/app_line.c"
+#include "firmware/board/app_calls.c"
 #include "firmware/board/application.c"
 #include "firmware/board/firmware.c"
 #include "firmware/board/isr.c"
