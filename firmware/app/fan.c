@@ -6,20 +6,21 @@
 #include "app/app.h"
 
 /* The thermistor's share of the resistance falls with the temperature: 1 less it rises. */
-#define FAN_OFF APP_SHARE(1.0 - 0.390)    /* 37 degrees Celsius */
-#define FAN_ON APP_SHARE(1.0 - 0.365)     /* 40 */
-#define FAN_FULL APP_SHARE(1.0 - 0.181)   /* 70 */
-#define FAN_BROKEN APP_SHARE(1.0 - 0.98)  /* below it a wire is broken */
-#define FAN_SHORTED APP_SHARE(1.0 - 0.02) /* above it the sensor is shorted */
+#define FAN_OFF APP_SHARE(1.0 - 0.390)   /* 37 degrees Celsius */
+#define FAN_ON APP_SHARE(1.0 - 0.365)    /* 40 */
+#define FAN_FULL APP_SHARE(1.0 - 0.181)  /* 70 */
+#define FAN_BROKEN APP_SHARE(1.0 - 0.98) /* below it a wire is broken; a short circuit reads as hot */
 #define FAN_LOW_RPM 800
 #define FAN_HIGH_RPM 3000
+#define FAN_CALM_MS 500u /* so long on the other side of its threshold: at power-up the input begins at 0, and a wire that breaks passes all */
 #define FAN_PAUSE_MS 10000u
 
-static uint16_t is_on, fault_ms;
+static uint16_t is_on, turned_ms, fault_ms;
 
 void app_init(void)
 {
     is_on = 0;
+    turned_ms = 0;
     fault_ms = 0;
 }
 
@@ -41,14 +42,16 @@ static uint16_t retries(const app_told_t *told)
 void app_ms(const app_told_t *told, app_asks_t *asks)
 {
     const app_range_t speeds = { APP_RPM(FAN_LOW_RPM), APP_RPM(FAN_HIGH_RPM) };
-    const uint16_t warmth_q16 = (uint16_t)~told->pot_q16;
-    if (warmth_q16 < FAN_BROKEN || warmth_q16 > FAN_SHORTED) {
-        is_on = 1;
-        asks->target = speeds.high;
-    } else {
-        is_on = (uint16_t)(warmth_q16 >= (is_on ? FAN_OFF : FAN_ON));
-        asks->target = app_between(speeds, app_share(warmth_q16, FAN_ON, FAN_FULL));
+    uint16_t has_turned, warmth_q16 = (uint16_t)~told->pot_q16;
+    if (warmth_q16 < FAN_BROKEN) {
+        warmth_q16 = 65535u;
     }
+    has_turned = (uint16_t)(is_on != (warmth_q16 >= (is_on ? FAN_OFF : FAN_ON)));
+    turned_ms = (uint16_t)(has_turned ? turned_ms + told->elapsed_ms : 0);
+    if (turned_ms >= FAN_CALM_MS) {
+        is_on ^= 1u;
+    }
+    asks->target = app_between(speeds, app_share(warmth_q16, FAN_ON, FAN_FULL));
     asks->clear_fault = retries(told);
     asks->run = (int16_t)(is_on && told->fault == (uint16_t)FAULT_NONE && !told->is_remote);
     asks->outputs = app_lights(told);

@@ -78,7 +78,7 @@ typedef struct {
     int16_t iq_q13;       /**< q current, counts of APP_AMPERE(): the torque */
     int16_t bus_q15;      /**< supply, counts of APP_VOLT() */
     uint16_t inputs;      /**< bits APP_S2, ... */
-    uint16_t pot_q16;     /**< potentiometer's share of its travel, smoothed, APP_SHARE(); in BIDIRECTIONAL_SPEED from its middle */
+    uint16_t pot_q16;     /**< potentiometer's share of its travel, smoothed from 0 at power-up, APP_SHARE(); in BIDIRECTIONAL_SPEED from its middle */
     int16_t towards;      /**< 1 or -1: the direction of the potentiometer's side in BIDIRECTIONAL_SPEED, else 1 */
     uint16_t pot_is_lost; /**< 1: its signal is where no position is, POT_LIVE_ZERO */
     app_range_t slow;     /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
