@@ -4,7 +4,6 @@
 
 #define TEXT_SILENT_MS 2000u
 
-static char answer[APP_LINE_SIZE];
 static int16_t target;
 static uint16_t silent_ms;
 
@@ -39,6 +38,7 @@ static const char *obey(const char *line, const app_told_t *told, app_asks_t *as
 /** The answer to a line: "ok run 1 speed 1498 fault NONE*5F". */
 static void reply(char *line, const app_told_t *told, app_asks_t *asks)
 {
+    static char answer[APP_LINE_SIZE];
     const uint16_t is_right = app_line_is_right(line);
     char *at = app_line_put(answer, is_right ? obey(line, told, asks) : "checksum");
     silent_ms = is_right ? 0 : silent_ms;

@@ -23,8 +23,7 @@ uint16_t app_share(uint16_t value, uint16_t from, uint16_t to)
 
 uint16_t app_may_pass(uint16_t fault)
 {
-#define APP_PASSES(code, name, passes, decided_by, cause, remedy) || ((passes) && fault == (code))
-    return (uint16_t)(0 DRIVE_FAULT_TABLE(APP_PASSES));
+    return retry_may_pass(fault);
 }
 
 int16_t app_between(app_range_t range, uint16_t share_q16)

@@ -44,7 +44,7 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     told->iq_q13 = d->run.control.i_q13.q;
     told->bus_q15 = qm_hi(d->bus_q31);
     told->inputs = (uint16_t)((BOARD_S2_DOWN() ? (uint16_t)APP_S2 : 0u) | (BOARD_S3_DOWN() ? (uint16_t)APP_S3 : 0u));
-    told->pot_is_lost = pot_is_lost(&board_pot, &board_params, elapsed_ms);
+    told->pot_is_lost = pot_is_broken(&board_pot, &board_params, elapsed_ms);
     told->towards = d->direction;
     told->pot_q16 = mode_pot_split(pot_travel(&board_params, pot_smooth(&board_pot)), &told->towards);
     told->slow.low = slow.low;

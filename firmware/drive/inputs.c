@@ -52,7 +52,7 @@ int16_t pot_smooth(pot_t *pot)
     return pot->used_q15;
 }
 
-uint16_t pot_is_lost(pot_t *pot, const drive_params_t *p, uint16_t elapsed_ms)
+uint16_t pot_is_broken(pot_t *pot, const drive_params_t *p, uint16_t elapsed_ms)
 {
     uint16_t pot_q16 = (uint16_t)((uint16_t)pot->now_q15 ^ 0x8000u), half = (uint16_t)(p->pot_zero_q16 >> 1);
     uint16_t top_q16 = (uint16_t)(65535u - half);

@@ -114,8 +114,7 @@ void retry_init(retry_t *r)
     r->left = RETRY_COUNT;
 }
 
-/** 1 for a fault that may pass by itself (drive/faults.h). */
-static uint16_t retry_may_pass(uint16_t fault)
+uint16_t retry_may_pass(uint16_t fault)
 {
 #define PASSING_BIT(code, name, passes, decided_by, cause, remedy) | ((uint32_t)(passes) << (code))
     const uint32_t passing = 0ul DRIVE_FAULT_TABLE(PASSING_BIT);

@@ -23,9 +23,6 @@
 #endif
 #define APP_LINE_SIZE 64u /* of a line heard or said, with its end */
 
-/** Of a function of the firmware that an application calls. */
-#define APP_CALLS __attribute__((externally_visible))
-
 /** Counts of a speed, current or voltage that is a constant. A speed is electrical rpm in counts of SPEED_UNIT, a current full scale / 8192. */
 #define APP_RPM(rpm) ((int16_t)PARAM_ROUND(PARAM_F(rpm) * PARAM_F(NOPOLESPAIRS) / PARAM_F(SPEED_UNIT)))
 #define APP_AMPERE(ampere) ((int16_t)CURRENT_Q13(ampere))

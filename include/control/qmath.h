@@ -7,6 +7,12 @@
 /** A part of the PWM period, composed in place: a call costs 18 cycles of saved registers. In the image every file is one unit. */
 #define INLINE inline __attribute__((always_inline))
 #define QM_INLINE static INLINE
+/** Of a function that an application calls: the image's one unit keeps it for another. */
+#ifdef __clang__
+#define APP_CALLS
+#else
+#define APP_CALLS __attribute__((externally_visible))
+#endif
 /** Called, so that it takes no registers from the main path. */
 #define NOINLINE __attribute__((noinline))
 

@@ -13,7 +13,7 @@ typedef struct {
 } button_t;
 
 /** 1 once per press. The application calls it, too. */
-uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms) __attribute__((externally_visible));
+uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms) APP_CALLS;
 
 /** Buttons of one background pass. */
 typedef struct {
@@ -44,6 +44,6 @@ uint16_t pot_travel(const drive_params_t *p, int16_t pot_q15);
 int16_t pot_smooth(pot_t *pot);
 
 /** 1 after a tenth of a second in the outer half of a dead end: a wire is broken. Never without dead ends (POT_LIVE_ZERO 0). */
-uint16_t pot_is_lost(pot_t *pot, const drive_params_t *p, uint16_t elapsed_ms);
+uint16_t pot_is_broken(pot_t *pot, const drive_params_t *p, uint16_t elapsed_ms);
 
 #endif

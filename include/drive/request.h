@@ -45,6 +45,9 @@ typedef struct {
     uint32_t waited_ms; /**< in the pause, or in closed loop since the last fault */
 } retry_t;
 
+/** 1 for a fault that may pass by itself (drive/faults.h). */
+uint16_t retry_may_pass(uint16_t fault);
+
 /** All retries left. */
 void retry_init(retry_t *r);
 

@@ -97,7 +97,7 @@ def relative(path: str) -> str:
 def configurations() -> list[tuple[str, ...]]:
     """Macros of each build that is looked at: as delivered, each mode alone, with the scope, some modes together."""
     modes = re.findall(r"^ *X\((\w+), ", MODE_TABLE.read_text(encoding="utf-8"), re.M)
-    return [(), *((mode,) for mode in modes), ("SCOPE",), *COMBINED]
+    return [(), *((mode,) for mode in modes), ("SCOPE",), ("APP_SERIAL",), *COMBINED]
 
 
 def defines(configuration: tuple[str, ...]) -> list[str]:
@@ -209,7 +209,7 @@ def main() -> int:
 
     unit = one_unit(sources)
     texts = {source: distinct(source, configurations()) for source in (unit, *CHECKS_OF_PARAMETERS)}
-    texts |= {source: distinct(source, [()]) for source in other_applications()}
+    texts |= {source: distinct(source, [("APP_SERIAL",) if "app/line.h" in Path(source).read_text(encoding="utf-8") else ()]) for source in other_applications()}
     jobs = [(source, defines(configuration)) for source, its in texts.items() for configuration in its]
     checks = {
         "cppcheck": lambda: cppcheck(unit, distinct(unit, [*configurations(), ON_TARGET]), sources),

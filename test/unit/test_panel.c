@@ -366,9 +366,9 @@ void test_a_lost_potentiometer_stays_lost_for_longer_than_a_word_counts(void)
     drive_params_t with = dead_ends();
     uint32_t ms;
     the_pot.now_q15 = INT16_MIN;
-    (void)pot_is_lost(&the_pot, &with, 100);
+    (void)pot_is_broken(&the_pot, &with, 100);
     for (ms = 0; ms < 70000ul; ms++) {
-        TEST_ASSERT_EQUAL_UINT16(1, pot_is_lost(&the_pot, &with, 1));
+        TEST_ASSERT_EQUAL_UINT16(1, pot_is_broken(&the_pot, &with, 1));
     }
 }
 
