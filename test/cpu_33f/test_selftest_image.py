@@ -125,7 +125,7 @@ def test_a_control_interrupt_that_dies_is_a_fault_of_its_own(board: PilBoard) ->
 
 # ---- memory and processor --------------------------------------------------------------------------------------------------
 
-@pytest.mark.parametrize("place", [0x0B02, 0x0D00, 0x0D7E, SPLIM - 6, SPLIM, RAM_END - 2])
+@pytest.mark.parametrize("place", [0x0B02, 0x0D40, 0x0D7E, SPLIM - 6, SPLIM, RAM_END - 2])
 def test_a_stuck_bit_of_ram_is_found_while_running(board: PilBoard, place: int) -> None:
     """In what is free and beyond the stack's limit: elsewhere the program may not last until it is found."""
     running(board)

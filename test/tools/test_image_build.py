@@ -111,7 +111,7 @@ def test_the_hex_starts_the_program_and_serves_the_control_interrupt():
 @needs_compiler
 def test_a_compiler_under_xc_dsc_s_names_makes_the_same_image(tmp_path):
     (tmp_path / "bin").mkdir()
-    for name in ("gcc", "bin2hex", "objdump", "ar"):
+    for name in ("gcc", "bin2hex", "objdump", "ar", "nm"):
         (tmp_path / f"bin/xc-dsc-{name}").write_text(f'#!/bin/sh\nexec {program(name)} "$@"\n', encoding="utf-8")
         (tmp_path / f"bin/xc-dsc-{name}").chmod(0o755)
     build_image()

@@ -1,8 +1,8 @@
 # The unit tests of the control law as the chip runs them: compiled by XC16, in the instruction-set simulator. Uses tools/make/image.mk.
-# Tests with mocks, registers (the board's) or stdio and those of the closed loop in floating point stay on the PC; so does test_identify, whose
-# floating point does not fit the flash beside the law.
-law_tests := $(filter-out unit/test_identify $(patsubst test/%.c,%,$(shell grep -lE 'mock_|<stdio\.h>|ideal_motor\.h|<math\.h>|identify_rig\.h|bringup_rig\.h|<xc\.h>|firmware/board|"board/' $(unit_c:%=test/%.c) /dev/null)),$(unit_c))
-target_test_law = $(patsubst %.c,$X/%.o,$(filter firmware/control/% firmware/drive/%,$(firmware_sources)))
+# Tests with mocks, registers (the board's) or stdio and those of the closed loop in floating point stay on the PC, and so do the applications'; so does
+# test_identify, whose floating point does not fit the flash beside the law.
+law_tests := $(filter-out unit/test_identify unit/test_app_% $(patsubst test/%.c,%,$(shell grep -lE 'mock_|<stdio\.h>|ideal_motor\.h|<math\.h>|identify_rig\.h|bringup_rig\.h|<xc\.h>|firmware/board|"board/' $(unit_c:%=test/%.c) /dev/null)),$(unit_c))
+target_test_law = $(patsubst %.c,$X/%.o,$(filter firmware/control/% firmware/drive/%,$(firmware_sources)) firmware/app/panel.c firmware/board/app_calls.c)
 target_test_simulator := $B/target-test
 
 $(target_test_simulator): test/sixteen_bit/sim_dspic.c test/sixteen_bit/ports.h $$(iss_folder)/libiss33f.a
