@@ -1,5 +1,7 @@
 /* Current limits: the circle that the d reference leaves to q, and braking current that fades with the bus. */
 #include "drive_rig.h"
+
+#include "drive/limits.h"
 #include "golden_current_limit.h"
 
 static drive_params_t limited;
