@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from xc16 import ROOT, build_image, make, needs_compiler, program, warnings
 
-from tools.common.param_rows import modes
 from tools.image import device, image
 
 TREE = ("Makefile", "userparams.h", "firmware", "include", "tools")
@@ -86,10 +85,14 @@ def test_the_successor_xc_dsc_is_found_by_its_own_names_where_there_is_no_xc16(t
     assert all(("-U__XC16__ -D__XC16__" in call) == defined for call in calls)
 
 
+MEMORY_OF_ITS_OWN = ("TUNING", "TORQUE_PROFILE", "SNAPSHOT", "IDENTIFY", "BRINGUP")
+"""Modes that share the RAM with the scope; the others without it: test/image/test_modes.py."""
+
+
 # ---- with it -------------------------------------------------------------------------------------------------------------
 @needs_compiler
-@pytest.mark.parametrize("word", ["OPT=-O1", "OPT=-O3", *(f"DEFINES=-DSCOPE=1 -D{mode}" for mode in modes())])
-def test_no_warning_and_a_good_image_at_every_level_and_with_the_scope_in_every_mode(word):
+@pytest.mark.parametrize("word", ["OPT=-O1", "OPT=-O3", *(f"DEFINES=-DSCOPE=1 -D{mode}" for mode in MEMORY_OF_ITS_OWN)])
+def test_no_warning_and_a_good_image_at_every_level_and_with_the_scope_in_modes_with_memory_of_their_own(word):
     build_image(word, "VARIANT=check")
 
 
