@@ -9,6 +9,7 @@
 #include "control/svm.h"
 #include "drive/faults.h"
 #include "drive/inputs.h"
+#include "drive/modes/mode_table.h"
 
 /** The most current that any step asks for, as a share of MAXIMUM_CURRENT_A. Over-current, bus and fault input protect as ever. */
 #define BRINGUP_CURRENT_SHARE 0.3
