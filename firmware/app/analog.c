@@ -33,6 +33,6 @@ void app_ms(const app_told_t *told, app_asks_t *asks)
     }
     asks->clear_fault = (uint16_t)(told->fault != (uint16_t)FAULT_NONE && off_ms >= ANALOG_CLEAR_MS);
     asks->run = (int16_t)(is_on && told->fault == (uint16_t)FAULT_NONE && !told->is_remote);
-    asks->target = (int16_t)(told->towards * app_between(all, app_share(told->pot_q16, ANALOG_START, 65535u)));
+    asks->target_erpm = (int16_t)(told->towards * app_between(all, app_share(told->pot_q16, ANALOG_START, 65535u)));
     asks->outputs = app_lights(told);
 }

@@ -51,7 +51,7 @@ void app_ms(const app_told_t *told, app_asks_t *asks)
     if (turned_ms >= FAN_CALM_MS) {
         is_on ^= 1u;
     }
-    asks->target = app_between(speeds, app_share(warmth_q16, FAN_ON, FAN_FULL));
+    asks->target_erpm = app_between(speeds, app_share(warmth_q16, FAN_ON, FAN_FULL));
     asks->clear_fault = retries(told);
     asks->run = (int16_t)(is_on && told->fault == (uint16_t)FAULT_NONE && !told->is_remote);
     asks->outputs = app_lights(told);

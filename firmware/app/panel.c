@@ -53,7 +53,7 @@ void panel_tick(panel_t *panel, const app_told_t *told, app_asks_t *asks)
     } else { /* as a rule */
     }
     panel_buttons(panel, told, asks);
-    asks->target = (int16_t)(told->towards * app_between(panel->fast_range ? told->fast : told->slow, told->pot_q16));
+    asks->target_erpm = (int16_t)(told->towards * app_between(panel->fast_range ? told->fast : told->slow, told->pot_q16));
     asks->outputs = panel_lights(panel, told);
     if (asks->fault != (uint16_t)FAULT_APPLICATION) {
         panel->kept = (int16_t)~panel->fast_range;

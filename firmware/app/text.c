@@ -42,7 +42,7 @@ static void reply(char *line, const app_told_t *told, app_asks_t *asks)
     const uint16_t is_right = app_line_is_right(line);
     char *at = app_line_put(answer, is_right ? obey(line, told, asks) : "checksum");
     silent_ms = is_right ? 0 : silent_ms;
-    at = app_line_put_number(app_line_put_number(at, " run ", (int16_t)told->is_running), " speed ", app_rpm_of(told->speed));
+    at = app_line_put_number(app_line_put_number(at, " run ", (int16_t)told->is_running), " speed ", app_rpm_of(told->speed_erpm));
     app_line_end(answer, app_line_put_fault(at, " fault ", told->fault));
     asks->say = answer;
 }
@@ -54,6 +54,6 @@ void app_ms(const app_told_t *told, app_asks_t *asks)
         reply(told->heard, told, asks);
     }
     asks->run = (int16_t)(asks->run && told->fault == (uint16_t)FAULT_NONE && silent_ms < TEXT_SILENT_MS);
-    asks->target = target;
+    asks->target_erpm = target;
     asks->outputs = app_lights(told);
 }

@@ -7,10 +7,9 @@
 #include "board/reset.h"
 #include "board/status.h"
 
-int16_t app_rpm_of(int16_t counts)
+int16_t app_rpm_of(speed_erpm_t speed_erpm)
 {
-    uint32_t size = qm_muluu((uint16_t)qm_abs(counts), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
-    return qm_with_sign((int16_t)qm_divud((size < most) ? size : most, NOPOLESPAIRS), counts);
+    return status_rpm(speed_erpm);
 }
 
 uint16_t app_share(uint16_t value, uint16_t from, uint16_t to)

@@ -15,12 +15,14 @@
 
 pot_t board_pot BOARD_UNSET;
 
-static volatile uint16_t application_runs BOARD_UNSET;  /* 1 during the call */
-static volatile uint16_t application_since BOARD_UNSET; /* drive ticks when it began */
+static volatile uint16_t application_runs BOARD_UNSET;     /* 1 during the call */
+static volatile uint16_t application_since BOARD_UNSET;    /* drive ticks when it began */
+static volatile uint16_t application_was_late BOARD_UNSET; /* 1 until that has its name */
 
 void application_init(void)
 {
     application_runs = 0;
+    application_was_late = 0;
     pot_init(&board_pot);
     app_init();
 }
@@ -39,8 +41,8 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
 #if SCOPE
     told->is_remote = remote_is_in_command(&scope_command);
 #endif
-    told->speed = told->is_running ? observer_speed(&d->run.observer) : 0;
-    told->reference = d->run.control.reference_erpm;
+    told->speed_erpm = told->is_running ? observer_speed(&d->run.observer) : 0;
+    told->reference_erpm = d->run.control.reference_erpm;
     told->iq_q13 = d->run.control.i_q13.q;
     told->bus_q15 = qm_hi(d->bus_q31);
     told->inputs = (uint16_t)((BOARD_S2_DOWN() ? (uint16_t)APP_S2 : 0u) | (BOARD_S3_DOWN() ? (uint16_t)APP_S3 : 0u));
@@ -52,7 +54,7 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     told->fast.low = fast.low;
     told->fast.high = fast.high;
     asks->run = request_stands(&board_request);
-    asks->target = d->command.target_erpm;
+    asks->target_erpm = d->command.target_erpm;
     asks->clear_fault = 0;
     asks->fault = (uint16_t)FAULT_NONE;
     asks->take_command = 0;
@@ -60,6 +62,20 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     told->heard = app_line_heard();
     asks->say = 0;
 #endif
+}
+
+/** Of an application that was late and has returned: what it asks is a stop, and once that is over the fault has its name. */
+static void application_ends(app_asks_t *asks)
+{
+    if (!application_was_late) {
+        return;
+    }
+    asks->run = 0;
+    asks->take_command = 1;
+    if (!drive_conducts(&board_drive)) {
+        asks->fault = (uint16_t)FAULT_APPLICATION;
+        application_was_late = 0;
+    }
 }
 
 /** A fault of the application's own. */
@@ -80,12 +96,13 @@ void application_tick(uint16_t elapsed_ms)
     application_runs = 1;
     app_ms(&told, &asks);
     application_runs = 0;
+    application_ends(&asks);
 #if APP_SERIAL
     app_line_say(asks.say);
 #endif
     application_fault(asks.fault);
     asked.run = asks.run;
-    asked.target = asks.target;
+    asked.target_erpm = asks.target_erpm;
     asked.clear_fault = asks.clear_fault;
     asked.take_command = asks.take_command;
     asked.elapsed_ms = elapsed_ms;
@@ -107,6 +124,7 @@ void application_watch(void)
     if (took <= LATE_TICKS) {
         ClrWdt();
     } else if (drive_conducts(&board_drive) && took < STOP_TICKS) {
+        application_was_late = 1;
         board_drive.command.run = 0;
         ClrWdt();
     } else { /* it stands, or does not stop: the watchdog has the last word */

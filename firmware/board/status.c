@@ -60,20 +60,13 @@ static char *put_retry(char *at)
     return text_put_fault(text_put_unsigned(text_put(at, " retries "), board_retry.left), " first ", board_retry.first);
 }
 
-/** Mechanical rpm of a speed without a sign. */
-static int16_t size_rpm(uint16_t size)
+int16_t status_rpm(speed_erpm_t speed)
 {
-    uint32_t erpm = qm_muluu(size, SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
+    uint32_t erpm = qm_muluu((uint16_t)qm_abs(speed), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
     if (SPEED_UNIT > NOPOLESPAIRS && erpm > most) { /* what a lost estimator sees */
         erpm = most;
     }
-    return (int16_t)qm_divud(erpm, NOPOLESPAIRS);
-}
-
-/** Mechanical rpm. */
-static int16_t speed_rpm(speed_erpm_t speed)
-{
-    return qm_with_sign(size_rpm((uint16_t)qm_abs(speed)), speed);
+    return qm_with_sign((int16_t)qm_divud(erpm, NOPOLESPAIRS), speed);
 }
 
 /** The line's text. @return its end */
@@ -83,7 +76,7 @@ static char *put_line(void)
     if (at == sent_line && !mode_speaks(&at)) {
         at = text_put_named(at, "state ", (int16_t)board_drive.state);
         at = text_put_fault(at, " fault ", board_drive.fault);
-        at = text_put_named(at, " speed ", speed_rpm(estimator_speed(&board_drive.run.estimator)));
+        at = text_put_named(at, " speed ", status_rpm(estimator_speed(&board_drive.run.estimator)));
         at = put_limits(put_retry(text_put(at, " rpm")));
         at = text_end(selftest_put(at));
     }

@@ -97,7 +97,7 @@ void request_tick(request_t *request, drive_t *d, const drive_params_t *p, const
         request_interrupt(request, 1);
     }
     remote_tick(asked->remote, request, d, asked->elapsed_ms);
-    request_command(request, d, p, request_in_range(p, remote_target(asked->remote, asked->target)));
+    request_command(request, d, p, request_in_range(p, remote_target(asked->remote, asked->target_erpm)));
     if (mode_background(d, p)) {
         request->wish_run = 0;
     }

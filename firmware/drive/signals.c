@@ -232,8 +232,6 @@ uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t 
     return (uint16_t)((qm_hi(s->id_q16) > p->id_off_q13) ? FAULT_CURRENT_SENSOR : FAULT_NONE);
 }
 
-#define SIGNALS_TURNS_MS 256u      /* from here on a whole turn ends the sum: angles that the estimator has wrong at its ends count less and less */
-#define SIGNALS_TURN_ERPM 6000     /* faster turns have fewer than ten looks each, and where the looks meet the same angles again they would sum up */
 #define SIGNALS_TURN_MOST_MS 1024u /* a turn that does not end is none */
 
 uint16_t signals_offset(signals_t *s, const drive_t *d, const drive_params_t *p)

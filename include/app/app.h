@@ -26,15 +26,15 @@
 /** Counts of a speed, current or voltage that is a constant. A speed is electrical rpm in counts of SPEED_UNIT, a current full scale / 8192. */
 #define APP_RPM(rpm) ((int16_t)PARAM_ROUND(PARAM_F(rpm) * PARAM_F(NOPOLESPAIRS) / PARAM_F(SPEED_UNIT)))
 #define APP_AMPERE(ampere) ((int16_t)CURRENT_Q13(ampere))
-#define APP_VOLT(volt) ((int16_t)(PARAM_F(volt) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F))
+#define APP_VOLT(volt) ((int16_t)PARAM_MIN(PARAM_F(volt) / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F, 32767.0F)) /* at full scale and above: its end */
 /** Counts of a share, 0..1: of the potentiometer's travel. */
 #define APP_SHARE(share) ((uint16_t)(PARAM_F(share) * 65535.0F))
 
 /** The same of a speed that is no constant. @param rpm int16_t; times NOPOLESPAIRS within a word */
 #define APP_OF_RPM(rpm) ((int16_t)((int16_t)((rpm) * (int16_t)NOPOLESPAIRS) / (int16_t)SPEED_UNIT))
 
-/** Shaft rpm of a speed in counts. */
-int16_t app_rpm_of(int16_t counts) APP_CALLS;
+/** Shaft rpm of a speed in counts, cut off towards 0. */
+int16_t app_rpm_of(speed_erpm_t speed_erpm) APP_CALLS;
 
 /** Where a value lies between two others: 0 at `from` and below, 65535 at `to` and above. */
 uint16_t app_share(uint16_t value, uint16_t from, uint16_t to) APP_CALLS;
@@ -64,22 +64,22 @@ int16_t app_between(app_range_t range, uint16_t share_q16) APP_CALLS;
 
 /** What the application is told. */
 typedef struct {
-    uint16_t elapsed_ms;  /**< since the last call; 1 as a rule */
-    uint16_t state;       /**< drive_state_t */
-    uint16_t fault;       /**< drive_fault_t; FAULT_NONE is 0 */
-    uint16_t limits;      /**< bits of limit_reason_t: why the drive gives less than it is asked for */
-    uint16_t is_running;  /**< 1 while the bridge conducts */
-    uint16_t is_remote;   /**< 1 while a client of the serial line is in command: what is asked for waits */
-    int16_t speed;        /**< estimated speed, counts of APP_RPM(); 0 while the bridge is off */
-    int16_t reference;    /**< the speed reference on its ramp */
-    int16_t iq_q13;       /**< q current, counts of APP_AMPERE(): the torque */
-    int16_t bus_q15;      /**< supply, counts of APP_VOLT() */
-    uint16_t inputs;      /**< bits APP_S2, ... */
-    uint16_t pot_q16;     /**< potentiometer's share of its travel, smoothed from 0 at power-up, APP_SHARE(); in BIDIRECTIONAL_SPEED from its middle */
-    int16_t towards;      /**< 1 or -1: the direction of the potentiometer's side in BIDIRECTIONAL_SPEED, else 1 */
-    uint16_t pot_is_lost; /**< 1: its signal is where no position is, POT_LIVE_ZERO */
-    app_range_t slow;     /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
-    app_range_t fast;     /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */
+    uint16_t elapsed_ms;         /**< since the last call; 1 as a rule */
+    uint16_t state;              /**< drive_state_t */
+    uint16_t fault;              /**< drive_fault_t; FAULT_NONE is 0 */
+    uint16_t limits;             /**< bits of limit_reason_t: why the drive gives less than it is asked for */
+    uint16_t is_running;         /**< 1 while the bridge conducts */
+    uint16_t is_remote;          /**< 1 while a client of the serial line is in command: what is asked for waits */
+    speed_erpm_t speed_erpm;     /**< estimated speed, counts of APP_RPM(); 0 while the bridge is off */
+    speed_erpm_t reference_erpm; /**< the speed reference on its ramp, counts of APP_RPM() */
+    int16_t iq_q13;              /**< q current, counts of APP_AMPERE(): the torque */
+    int16_t bus_q15;             /**< supply, counts of APP_VOLT() */
+    uint16_t inputs;             /**< bits APP_S2, ... */
+    uint16_t pot_q16;            /**< potentiometer's share of its travel, smoothed from 0 at power-up, APP_SHARE(); in BIDIRECTIONAL_SPEED from its middle */
+    int16_t towards;             /**< 1 or -1: the direction of the potentiometer's side in BIDIRECTIONAL_SPEED, else 1 */
+    uint16_t pot_is_lost;        /**< 1: its signal is where no position is, POT_LIVE_ZERO */
+    app_range_t slow;            /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
+    app_range_t fast;            /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */
 #if APP_SERIAL
     char *heard; /**< a line that has come, without its end; 0 without. Only for this call */
 #endif
@@ -88,7 +88,7 @@ typedef struct {
 /** What it asks for. Before the call it holds what stands; what the application does not change stays. */
 typedef struct {
     int16_t run;           /**< 1: run. From 0 to 1 without a fault starts; 0 stops in order. 0 after a fault, but for one that the retry will clear */
-    int16_t target;        /**< speed, its sign the direction, counts of APP_RPM(); TORQUE_MODE: q current, counts of APP_AMPERE() */
+    int16_t target_erpm;   /**< speed, its sign the direction, counts of APP_RPM(); TORQUE_MODE: q current, counts of APP_AMPERE() */
     uint16_t clear_fault;  /**< 1: clear the fault, once */
     uint16_t fault;        /**< a fault of the application's own: FAULT_POTENTIOMETER for a lost command signal, any other is FAULT_APPLICATION */
     uint16_t take_command; /**< 1: take command back from a client of the serial line */

@@ -14,7 +14,8 @@ void application_init(void);
 void application_tick(uint16_t elapsed_ms);
 
 /** Each pass of the slow work: an application that does not return is late after APP_LATE_MS. Then the drive stops in order, for APPLICATION_STOP_SEC
- *  at most, and then the fault is APPLICATION; the watchdog, which has been served meanwhile, resets the processor. */
+ *  at most, and then the fault is APPLICATION, also where it has returned meanwhile. If it does not, the watchdog, which has been served until then, resets
+ *  the processor. */
 void application_watch(void);
 
 #endif

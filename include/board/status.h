@@ -17,6 +17,9 @@ void status_tick(uint16_t elapsed_ms);
 /** Hands one character to the UART if it has room. */
 void status_send(void);
 
+/** A speed in rpm of the shaft, cut off towards 0. @param speed counts of SPEED_UNIT electrical rpm @return within a word: a lost estimator may see more */
+int16_t status_rpm(speed_erpm_t speed);
+
 /* ---- Text into a buffer, for the status line ---- */
 
 /** Each writes from `at` on, without a closing zero, and returns where the next text goes. The caller has room. */

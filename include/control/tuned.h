@@ -153,6 +153,8 @@
 #define PROBE_LEAST_SALIENT_Q15 9830 /* [Q15] 0.3: such a d current takes of a salient motor's torque, too | lowspeed MOTOR=ipm_4pp_24v_2000 */
 #define SIGNALS_MOST_TIMES 2        /* [1] a deviation counts as twice its limit at most: then it may last 0.35 s | campaign */
 #define SIGNALS_MEAN_SHIFT 9        /* [shift] its mean is one over 512 ms | campaign */
+#define SIGNALS_TURNS_MS 256u       /* [ms] from here on a whole turn ends the sum of back-EMF: angles that are wrong at its ends count less and less | campaign */
+#define SIGNALS_TURN_ERPM 6000      /* [erpm] faster turns have fewer than ten looks each, and looks that meet the same angles again would sum up | campaign */
 #define SIGNALS_SAMPLES 64u         /* [samples] of the phases' currents that are compared, some 62 ms | run SCENARIO=fault_open_phase */
 
 /* clang-format on */

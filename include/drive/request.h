@@ -7,7 +7,7 @@
 /** What the application asks for in a pass. */
 typedef struct {
     int16_t run;           /**< 1: run; 0: stop in order */
-    int16_t target;        /**< speed target, signed, electrical rpm (counts of SPEED_UNIT of them); TORQUE_MODE: q current, Q13 */
+    int16_t target_erpm;   /**< speed target, signed, electrical rpm (counts of SPEED_UNIT of them); TORQUE_MODE: q current, Q13 */
     uint16_t clear_fault;  /**< 1: one request */
     uint16_t take_command; /**< 1: from a client of the serial line */
     uint16_t elapsed_ms;   /**< since the last pass, 1 or more */

@@ -179,6 +179,25 @@ static inline double seconds_to_fault(double limit)
     return get("time_s") - begin;
 }
 
+/** Until the state is reached. @return seconds, or the limit */
+static inline double seconds_to(drive_state_t state, double limit)
+{
+    double begin = get("time_s");
+    while (board_drive.state != (uint16_t)state && get("time_s") < begin + limit) {
+        wait_s(0.0005);
+    }
+    return get("time_s") - begin;
+}
+
+/** A rotor of so many times the header's inertia turns for a second, and S2 is pressed to stop it. */
+static inline void stop_from(double rpm, double inertias)
+{
+    run_at(rpm);
+    set("mech.inertia_kgm2", inertias * 5.5e-6);
+    wait_s(1.0);
+    press("input.s2");
+}
+
 /** A new board; the last test's goes. */
 static inline void bench_set_up(void)
 {

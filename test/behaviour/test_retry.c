@@ -14,16 +14,6 @@ void setUp(void)
     bench_set_up();
 }
 
-/** Until the state is reached. @return seconds, or the limit */
-static double seconds_to(drive_state_t state, double limit)
-{
-    double begin = get("time_s");
-    while (board_drive.state != (uint16_t)state && get("time_s") < begin + limit) {
-        wait_s(0.001);
-    }
-    return get("time_s") - begin;
-}
-
 void test_a_shaft_that_is_freed_in_time_turns_again(void)
 {
     run_at(1500.0);

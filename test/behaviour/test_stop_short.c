@@ -13,24 +13,11 @@ void setUp(void)
     bench_set_up();
 }
 
-/** Until the state is reached. @return seconds, or the limit */
-static double seconds_to(drive_state_t state, double limit)
-{
-    double begin = get("time_s");
-    while (board_drive.state != (uint16_t)state && get("time_s") < begin + limit) {
-        wait_s(0.0005);
-    }
-    return get("time_s") - begin;
-}
-
 void test_a_rotor_of_any_inertia_is_shorted_from_1750_rpm_to_standstill_within_the_current_limit(void)
 {
     static const double inertias[] = { 1.0, 9.0, 36.0 };
     for (size_t i = 0; i < sizeof inertias / sizeof inertias[0]; i++) {
-        run_at(2800.0);
-        set("mech.inertia_kgm2", inertias[i] * 5.5e-6);
-        wait_s(1.0);
-        press("input.s2");
+        stop_from(2800.0, inertias[i]);
         (void)seconds_to(DRIVE_BRAKE, 3.0);
         TEST_ASSERT_EQUAL_UINT16(DRIVE_BRAKE, board_drive.state);
         TEST_ASSERT_DOUBLE_WITHIN(150.0, 1700.0, get("state.speed_rpm"));

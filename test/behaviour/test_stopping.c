@@ -44,10 +44,7 @@ void test_S2_during_a_stop_goes_on_from_the_present_speed_without_a_bounce(void)
 {
     static const double inertias[] = { 1.0, 9.0, 36.0 };
     for (size_t i = 0; i < sizeof inertias / sizeof inertias[0]; i++) {
-        run_at(2800.0);
-        set("mech.inertia_kgm2", inertias[i] * 5.5e-6);
-        wait_s(1.0);
-        press("input.s2");
+        stop_from(2800.0, inertias[i]);
         TEST_ASSERT_EQUAL_INT(DRIVE_STOPPING, board_drive.state);
         wait_s(0.1);
         double before = get("state.speed_rpm");

@@ -51,7 +51,7 @@ void test_the_range_above_the_threshold_is_minimum_to_maximum_speed(void)
     } at[] = { { 0.06F, 500 }, { 0.08F, 500 }, { 0.54F, 2250 }, { 1.0F, 4000 } };
     EACH(n, at) {
         signal(at[n].share, 1);
-        TEST_ASSERT_INT16_WITHIN(2, at[n].speed, asks.target);
+        TEST_ASSERT_INT16_WITHIN(2, at[n].speed, asks.target_erpm);
     }
 }
 
@@ -59,7 +59,7 @@ void test_with_a_signal_for_both_directions_its_side_chooses(void)
 {
     told.towards = -1;
     signal(1.0F, 1);
-    TEST_ASSERT_INT16_WITHIN(2, -4000, asks.target);
+    TEST_ASSERT_INT16_WITHIN(2, -4000, asks.target_erpm);
 }
 
 void test_a_second_without_signal_clears_a_fault_and_the_next_signal_starts(void)

@@ -54,16 +54,16 @@ void test_the_speed_rises_from_40_to_70_degrees(void)
 {
     int16_t celsius, before = 0;
     at_celsius(38.0);
-    TEST_ASSERT_EQUAL_INT16(APP_RPM(FAN_LOW_RPM), asks.target);
+    TEST_ASSERT_EQUAL_INT16(APP_RPM(FAN_LOW_RPM), asks.target_erpm);
     for (celsius = 41; celsius <= 69; celsius++) {
         at_celsius(celsius);
-        TEST_ASSERT_GREATER_THAN_INT16(before, asks.target);
-        before = asks.target;
+        TEST_ASSERT_GREATER_THAN_INT16(before, asks.target_erpm);
+        before = asks.target_erpm;
     }
     at_celsius(71.0);
-    TEST_ASSERT_INT16_WITHIN(1, APP_RPM(FAN_HIGH_RPM), asks.target);
+    TEST_ASSERT_INT16_WITHIN(1, APP_RPM(FAN_HIGH_RPM), asks.target_erpm);
     at_celsius(55.0);
-    TEST_ASSERT_INT16_WITHIN(APP_RPM(200), APP_RPM((FAN_LOW_RPM + FAN_HIGH_RPM) / 2), asks.target);
+    TEST_ASSERT_INT16_WITHIN(APP_RPM(200), APP_RPM((FAN_LOW_RPM + FAN_HIGH_RPM) / 2), asks.target_erpm);
 }
 
 void test_with_a_broken_or_shorted_sensor_it_turns_at_its_highest_speed(void)
@@ -74,7 +74,7 @@ void test_with_a_broken_or_shorted_sensor_it_turns_at_its_highest_speed(void)
         told.pot_q16 = ends[n];
         (void)rig_clears(FAN_CALM_MS);
         TEST_ASSERT_EQUAL_INT16(1, asks.run);
-        TEST_ASSERT_INT16_WITHIN(1, APP_RPM(FAN_HIGH_RPM), asks.target);
+        TEST_ASSERT_INT16_WITHIN(1, APP_RPM(FAN_HIGH_RPM), asks.target_erpm);
     }
 }
 

@@ -16,10 +16,10 @@ void test_it_runs_from_the_first_call_on_at_its_one_speed(void)
 {
     rig_ms();
     TEST_ASSERT_EQUAL_INT16(1, asks.run);
-    TEST_ASSERT_EQUAL_INT16(APP_RPM(FIXED_RPM), asks.target);
+    TEST_ASSERT_EQUAL_INT16(APP_RPM(FIXED_RPM), asks.target_erpm);
     told.pot_q16 = 65535;
     rig_ms();
-    TEST_ASSERT_EQUAL_INT16(APP_RPM(FIXED_RPM), asks.target);
+    TEST_ASSERT_EQUAL_INT16(APP_RPM(FIXED_RPM), asks.target_erpm);
 }
 
 void test_a_fault_is_cleared_after_the_pause_and_the_motor_then_starts_anew(void)

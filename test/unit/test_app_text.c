@@ -81,7 +81,7 @@ void test_run_starts_and_stop_stops(void)
     TEST_ASSERT_EQUAL_STRING("ok run 0 speed 0 fault NONE*6A\r\n", says("run*69\n"));
     TEST_ASSERT_EQUAL_INT16(1, asks.run);
     told.is_running = 1;
-    told.speed = APP_RPM(-1500);
+    told.speed_erpm = APP_RPM(-1500);
     TEST_ASSERT_EQUAL_STRING("ok run 1 speed -1500 fault NONE*72\r\n", says("stop*18\r\n"));
     TEST_ASSERT_EQUAL_INT16(0, asks.run);
 }
@@ -89,9 +89,9 @@ void test_run_starts_and_stop_stops(void)
 void test_speed_sets_the_target_with_its_direction(void)
 {
     (void)says("speed 1500*43\n");
-    TEST_ASSERT_EQUAL_INT16(APP_RPM(1500), asks.target);
+    TEST_ASSERT_EQUAL_INT16(APP_RPM(1500), asks.target_erpm);
     (void)says("speed -1500*6E\n");
-    TEST_ASSERT_EQUAL_INT16(APP_RPM(-1500), asks.target);
+    TEST_ASSERT_EQUAL_INT16(APP_RPM(-1500), asks.target_erpm);
     TEST_ASSERT_EQUAL_INT16_MESSAGE(0, asks.run, "a speed alone starts nothing");
 }
 
@@ -101,7 +101,7 @@ void test_a_speed_outside_the_range_changes_nothing(void)
     (void)says("speed 1500*43\n");
     EACH(n, lines) {
         TEST_ASSERT_EQUAL_STRING_LEN("range ", says(lines[n]), 6);
-        TEST_ASSERT_EQUAL_INT16(APP_RPM(1500), asks.target);
+        TEST_ASSERT_EQUAL_INT16(APP_RPM(1500), asks.target_erpm);
     }
 }
 

@@ -16,7 +16,7 @@
 
 static app_told_t seen;
 static app_asks_t wanted, stood;
-static uint16_t begun, stuck_ms, served;
+static uint16_t begun, stuck_ms, late_by_ticks, served;
 static struct {
     uint16_t ms, state, served;
 } ends, stops; /* of a stuck call: the first millisecond of the fault, and of a drive that is asked to stop */
@@ -39,6 +39,8 @@ void app_ms(const app_told_t *told, app_asks_t *asks)
     seen = *told;
     stood = *asks;
     *asks = wanted;
+    board_drive.ticks = (uint16_t)(board_drive.ticks + late_by_ticks);
+    application_watch();
     for (served = host_watchdog_serves; stuck_ms != 0u; stuck_ms--) {
         for (n = 0; n < 20u; n++) {
             const uint16_t state = board_drive.state;
@@ -58,11 +60,12 @@ void app_ms(const app_told_t *told, app_asks_t *asks)
 
 void setUp(void)
 {
-    static const app_asks_t nothing = { .target = 10000 };
+    static const app_asks_t nothing = { .target_erpm = 10000 };
     host_registers_reset();
     ADC1BUF3 = (uint16_t)(int16_t)(24.0F / 52.8F * 65536.0F - 32768.0F);
     wanted = nothing;
     stuck_ms = 0;
+    late_by_ticks = 0;
     begun = 0;
     ends.ms = 0;
     stops.ms = 0;
@@ -153,7 +156,7 @@ void test_a_target_is_brought_into_the_range_of_speeds_with_its_sign(void)
 {
     static const int16_t cases[][2] = { { 0, 2500 }, { 100, 2500 }, { 27000, 27000 }, { 32767, 27500 }, { -1, -2500 }, { -9000, -9000 }, { -32768, -27500 } };
     EACH(n, cases) {
-        wanted.target = cases[n][0];
+        wanted.target_erpm = cases[n][0];
         board_ms(1);
         TEST_ASSERT_EQUAL_INT16(cases[n][1], board_drive.command.target_erpm);
     }
@@ -231,6 +234,29 @@ void test_a_late_application_ends_the_run_in_order_and_is_the_fault_once_the_dri
     TEST_ASSERT_EQUAL_UINT16(FAULT_APPLICATION, board_drive.fault);
     TEST_ASSERT_TRUE(ends.ms + 1u >= stops.ms && (uint16_t)(ends.served - served) > 150u);
     TEST_ASSERT_EQUAL_HEX16(BOARD_OUTPUTS_OFF, P1OVDCON);
+}
+
+void test_an_application_that_returns_late_ends_the_run_in_order_too(void)
+{
+    board_drive.state = (uint16_t)DRIVE_CLOSED; /* no interrupt comes: the rotor is far from a stop */
+    board_drive.command.run = 1;
+    board_request.wish_run = 1;
+    board_request.asked_run = 1;
+    wanted.run = 1;
+    late_by_ticks = LATE_TICKS + 20u;
+    application_tick(1);
+    late_by_ticks = 0;
+    TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
+    application_tick(1); /* in time again */
+    TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    board_drive.state = (uint16_t)DRIVE_STOPPED;
+    application_tick(1);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_APPLICATION, board_drive.fault);
+    TEST_ASSERT_EQUAL_INT16(0, board_drive.command.run);
+    board_drive.fault = (uint16_t)FAULT_NONE;
+    application_tick(1); /* named once */
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
 }
 
 void test_the_watchdog_is_not_served_for_an_application_that_has_been_named_and_the_reset_tells_its_name(void)

@@ -32,14 +32,14 @@ static inline app_told_t panel_told(const drive_params_t *p, const buttons_t *in
 static inline void panel_pass(const drive_params_t *p, const buttons_t *in)
 {
     const app_told_t told = panel_told(p, in);
-    app_asks_t asks = { .run = request_stands(&the_request), .target = drive.command.target_erpm };
+    app_asks_t asks = { .run = request_stands(&the_request), .target_erpm = drive.command.target_erpm };
     asked_t asked;
     panel_tick(&the_panel, &told, &asks);
     if (asks.fault != (uint16_t)FAULT_NONE) {
         drive_raise(&drive, (drive_fault_t)asks.fault);
     }
     asked.run = asks.run;
-    asked.target = asks.target;
+    asked.target_erpm = asks.target_erpm;
     asked.clear_fault = asks.clear_fault;
     asked.take_command = asks.take_command;
     asked.elapsed_ms = in->elapsed_ms;
@@ -64,7 +64,7 @@ static inline int16_t panel_target(const drive_params_t *p, int16_t pot_q15, int
     told.towards = direction;
     told.pot_q16 = mode_pot_split(pot_travel(p, pot_q15), &told.towards);
     panel_tick(&panel, &told, &asks);
-    return asks.target;
+    return asks.target_erpm;
 }
 
 /** Milliseconds of the panel alone. */
