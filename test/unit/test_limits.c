@@ -271,6 +271,17 @@ void test_low_bus_narrows_the_driving_current_alone_and_says_so(void)
     }
 }
 
+void test_a_reason_goes_with_its_limit(void)
+{
+    (void)derated_at(14.0F, 1, 500);
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_LOW_BUS, drive.run.control.limited_by);
+    drive.bus_q31 = (int32_t)(24.0F / PARAM_F(BUS_FULL_SCALE_V) * 32768.0F) * 65536;
+    drive.run.control.iq_limit_q13 = 5000;
+    limits_driving(&drive, &derated);
+    TEST_ASSERT_EQUAL_INT16(5000, drive.run.control.iq_limit_q13);
+    TEST_ASSERT_EQUAL_HEX16(LIMIT_NONE, drive.run.control.limited_by);
+}
+
 void test_the_narrower_of_supply_and_low_bus_counts(void)
 {
     drive_params_t both = derated;
