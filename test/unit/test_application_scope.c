@@ -43,6 +43,7 @@ void setUp(void)
     board_drive.state = (uint16_t)DRIVE_CLOSED;
     board_drive.direction = 1;
     request_init(&board_request);
+    drive_zero(&scope_command, sizeof scope_command);
     remote_init(&scope_command);
     application_init();
     late = 0;
@@ -51,6 +52,7 @@ void setUp(void)
     scope_command.lease_ms = 1000;
     scope_command.run = 1;
     application_tick(1);
+    TEST_ASSERT_EQUAL_INT16(1, board_drive.command.run);
 }
 
 void test_a_client_s_run_stands_whatever_the_application_asks(void)
