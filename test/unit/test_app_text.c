@@ -17,6 +17,11 @@ int16_t uart_receive(void)
     return (int16_t)((*coming != '\0') ? *coming++ : -1);
 }
 
+int16_t status_rpm(speed_erpm_t speed)
+{
+    return (int16_t)((int32_t)speed * SPEED_UNIT / NOPOLESPAIRS);
+}
+
 char *text_put(char *at, const char *text)
 {
     size_t size = strlen(text);
