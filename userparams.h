@@ -145,6 +145,28 @@
 /* ---- Stop: what follows when a stop is requested in closed loop --------------------------------------------------- */
 #define STOP_MODE 0                 /* [mode]          0 .. 2         0: ramp down, then let go; 1: coast, outputs off at once; 2: ramp down to where a short circuit of the winding fits, then short it until the rotor stands */
 
+/* ---- Inputs and outputs of a product: their pins and levels are rows of include/board/mclv.h ---------------------- */
+#ifndef DIRECTION_INPUT_USED /* or build with -DDIRECTION_INPUT_USED=1 */
+#define DIRECTION_INPUT_USED 0      /* [switch]        0 .. 1         1: an input turns the direction round; 0: its pin stays free */
+#endif
+#ifndef FAULT_OUTPUT_USED /* or build with -DFAULT_OUTPUT_USED=1 */
+#define FAULT_OUTPUT_USED 0         /* [switch]        0 .. 1         1: an output for a relay tells of a fault; 0: its pin stays free */
+#endif
+#ifndef RUNNING_OUTPUT_USED /* or build with -DRUNNING_OUTPUT_USED=1 */
+#define RUNNING_OUTPUT_USED 0       /* [switch]        0 .. 1         1: an output for a relay is on while the bridge conducts; 0: its pin stays free */
+#endif
+
+/* ---- Brake chopper: an output switches a resistor onto the bus. It must come before REGEN_LIMIT_V ----------------- */
+#ifndef BRAKE_CHOPPER_V /* or build with -DBRAKE_CHOPPER_V=0..88 */
+#define BRAKE_CHOPPER_V 0           /* [V]             0 .. 88        bus at which the brake resistor is switched on, off again 2 % below; 0: no brake resistor */
+#endif
+#ifndef BRAKE_CHOPPER_SHARE /* or build with -DBRAKE_CHOPPER_SHARE=0.01..1 */
+#define BRAKE_CHOPPER_SHARE 0.1     /* [1]             0.01 .. 1      share of time that the brake resistor bears in the mean of BRAKE_CHOPPER_SEC; 1: always */
+#endif
+#ifndef BRAKE_CHOPPER_SEC /* or build with -DBRAKE_CHOPPER_SEC=1..60 */
+#define BRAKE_CHOPPER_SEC 10        /* [s]             1 .. 60        time of that mean: a cold resistor is on for BRAKE_CHOPPER_SHARE of it at once */
+#endif
+
 /* ---- Snapshot ----------------------------------------------------------------------------------------------------- */
 #define SNAPDELAY 5                 /* [periods]       1 .. 32000     one row every SNAPDELAY periods */
 #define DATA_BUFFER_SIZE 50         /* [rows]          2 .. 150       rows of each of the four arrays */

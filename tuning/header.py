@@ -108,7 +108,8 @@ def _left(name: str, design: Design) -> str:
 
 def _define(design: Design, row: Parameter, facts: dict[str, str]) -> str:
     line = f"{_left(row.name, design)}{_comment(row, facts.get(row.name, ''))}"
-    return f"#ifndef {row.name} /* or build with -D{row.name}=1 */\n{line}\n#endif" if row.name in FROM_DEFINES else line
+    value = "1" if row.unit == "switch" else f"{row.low}..{row.high}"
+    return f"#ifndef {row.name} /* or build with -D{row.name}={value} */\n{line}\n#endif" if row.name in FROM_DEFINES else line
 
 
 def _comment(row: Parameter, fact: str = "") -> str:

@@ -40,6 +40,6 @@ void app_ms(const app_told_t *told, app_asks_t *asks)
     } else { /* it runs, or waits */
     }
     asks->run = (int16_t)(!has_fault && !told->is_remote); /* it starts again when a client has given the command back */
-    asks->target_erpm = APP_RPM(FIXED_RPM);
+    asks->target_erpm = ((DIRECTION_INPUT_USED) && (told->inputs & APP_DIRECTION) != 0u) ? APP_RPM(-FIXED_RPM) : APP_RPM(FIXED_RPM);
     asks->outputs = app_lights(told);
 }

@@ -15,6 +15,8 @@
 
 pot_t board_pot BOARD_UNSET;
 
+static contact_t direction_input BOARD_UNSET;
+
 static volatile uint16_t application_runs BOARD_UNSET;     /* 1 during the call */
 static volatile uint16_t application_since BOARD_UNSET;    /* drive ticks when it began */
 static volatile uint16_t application_was_late BOARD_UNSET; /* 1 until that has its name */
@@ -24,7 +26,25 @@ void application_init(void)
     application_runs = 0;
     application_was_late = 0;
     pot_init(&board_pot);
+    if (DIRECTION_INPUT_USED) {
+        contact_init(&direction_input);
+    }
     app_init();
+}
+
+/** What is set at the board: buttons, potentiometer, and the direction input, which turns round what the potentiometer's side means. */
+static void application_operated(app_told_t *told, uint16_t elapsed_ms)
+{
+    int16_t turn = 1;
+    told->inputs = (uint16_t)((BOARD_S2_DOWN() ? (uint16_t)APP_S2 : 0u) | (BOARD_S3_DOWN() ? (uint16_t)APP_S3 : 0u));
+    if ((DIRECTION_INPUT_USED) && contact_settled(&direction_input, (uint16_t)BOARD_DIRECTION_ON(), elapsed_ms)) {
+        told->inputs |= (uint16_t)APP_DIRECTION;
+        turn = -1;
+    }
+    told->pot_is_lost = pot_is_broken(&board_pot, &board_params, elapsed_ms);
+    told->towards = (int16_t)(turn * board_drive.direction);
+    told->pot_q16 = mode_pot_split(pot_travel(&board_params, pot_smooth(&board_pot)), &told->towards);
+    told->towards = (int16_t)(turn * told->towards);
 }
 
 /** What the application is told of the drive, and what stands. */
@@ -45,10 +65,7 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     told->reference_erpm = d->run.control.reference_erpm;
     told->iq_q13 = d->run.control.i_q13.q;
     told->bus_q15 = qm_hi(d->bus_q31);
-    told->inputs = (uint16_t)((BOARD_S2_DOWN() ? (uint16_t)APP_S2 : 0u) | (BOARD_S3_DOWN() ? (uint16_t)APP_S3 : 0u));
-    told->pot_is_lost = pot_is_broken(&board_pot, &board_params, elapsed_ms);
-    told->towards = d->direction;
-    told->pot_q16 = mode_pot_split(pot_travel(&board_params, pot_smooth(&board_pot)), &told->towards);
+    application_operated(told, elapsed_ms);
     told->slow.low = slow.low;
     told->slow.high = slow.high;
     told->fast.low = fast.low;

@@ -7,6 +7,7 @@
 #include "board/status.h"
 #include "board/reset.h"
 #include "board/watch.h"
+#include "drive/limits.h"
 #include "drive/param_init.h"
 #include "drive/tick.h"
 
@@ -14,6 +15,8 @@
 MODE_PARAMS_PLACE drive_params_t board_params = DRIVE_PARAMS_INIT;
 
 volatile uint16_t board_clock_failed BOARD_UNSET;
+
+chopper_t board_chopper;
 
 /* From the control interrupt to the slow work, which says so: there the fault takes no time from the next duties. */
 static uint16_t board_is_late;
@@ -127,6 +130,21 @@ void BOARD_ISR_SHADOW _ADC1Interrupt(void)
     }
 }
 
+/** What a product has beside the LEDs: relays and the brake resistor. The one place that writes their pins after the start, also in a fault and where the
+ *  background stands. @param v_bus_raw the converter's result */
+QM_INLINE void board_signals(int16_t v_bus_raw)
+{
+    if (CHOPPER_USED) {
+        BOARD_SIGNAL(CHOPPER, bus_chopper(&board_chopper, bus_sample(v_bus_raw), board_drive.ticks));
+    }
+    if (RUNNING_OUTPUT_USED) {
+        BOARD_SIGNAL(RUNNING_OUTPUT, drive_outputs(&board_drive));
+    }
+    if (FAULT_OUTPUT_USED) {
+        BOARD_SIGNAL(FAULT_OUTPUT, board_drive.fault);
+    }
+}
+
 /** What has no deadline but the next period's begin, every second period, and with the bridge off each. The control interrupt raises it and may
  *  interrupt it; timer 2 stands still, only its vector is used. */
 void BOARD_ISR _T2Interrupt(void)
@@ -154,6 +172,7 @@ void BOARD_ISR _T2Interrupt(void)
         pwm_outputs_off();
         recorder_in_fault(&board_recorder, &board_drive);
     }
+    board_signals(raw.v_bus);
     if (recorder_is_due(&board_drive)) { /* the samples once more: kept, they would take registers from the slow work */
         recorder_write(&board_recorder, &board_drive, (int16_t)ADC1BUF1, (int16_t)ADC1BUF2, (int16_t)ADC1BUF3);
     }

@@ -69,12 +69,16 @@ uint16_t clock_init(void)
 void pins_init(void)
 {
     AD1PCFGL = BOARD_AD1PCFGL;
-    LATA = 0;
-    LATB = 0;
-    LATC = 0;
+    LATA = BOARD_LAT(A);
+    LATB = BOARD_LAT(B);
+    LATC = BOARD_LAT(C);
     TRISA = BOARD_TRIS(A);
     TRISB = BOARD_TRIS(B);
     TRISC = BOARD_TRIS(C);
+    if (DIRECTION_INPUT_USED) {
+        CNPU1 = BOARD_CNPU1;
+        CNPU2 = BOARD_CNPU2;
+    }
 
     clock_write_low((uint16_t)(OSCCON & ~0x0040u)); /* unlock the pin selection */
     RPINR12 = BOARD_FLTA_RP;

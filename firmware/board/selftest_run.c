@@ -63,6 +63,10 @@ static const written_t written[] = {
     { &TRISB, 0xFFFFu, BOARD_TRIS(B) },
     { &TRISC, 0x03FFu, BOARD_TRIS(C) & 0x03FFu },
     { &RPINR12, 0x001Fu, BOARD_FLTA_RP },
+#if DIRECTION_INPUT_USED
+    { &CNPU1, 0xFFFFu, BOARD_CNPU1 },
+    { &CNPU2, 0x7FFFu, BOARD_CNPU2 },
+#endif
     /* clock, timer, power of the peripherals */
     { &OSCCON, 0x7060u, 0x3060u }, /* the crystal with the PLL, locked; pin selection locked */
     { &PLLFBD, 0x01FFu, BOARD_PLLFBD },

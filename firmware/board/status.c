@@ -34,7 +34,7 @@ static uint16_t waited_ms BOARD_UNSET;
  *  @return the text's end */
 static char *put_limits(char *at)
 {
-    const char *name = DRIVE_LIMIT_TABLE(LIMIT_NAME);
+    const char *name = CHOPPER_USED ? DRIVE_LIMIT_TABLE(LIMIT_NAME) : DRIVE_LIMIT_TABLE_BARE(LIMIT_NAME);
     char *end = at;
     uint16_t bit = 1, seen = LimitParm.seen;
     if (seen != 0u) {

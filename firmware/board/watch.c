@@ -64,6 +64,9 @@ void watch_refresh(void)
     AdaptParm.qInvKFi = qm_hi(run->adaptation.kfi_q31);
     AdaptParm.qRs = qm_hi(run->adaptation.rs_q31);
     LimitParm.now = limits_reasons(d, &board_params);
+    if (CHOPPER_USED && board_chopper.rests) {
+        LimitParm.now |= (uint16_t)LIMIT_CHOPPER;
+    }
     LimitParm.seen |= LimitParm.now;
     RetryParm.left = board_retry.left;
     RetryParm.first = board_retry.first;

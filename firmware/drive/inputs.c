@@ -21,6 +21,26 @@ uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms)
     return (uint16_t)(before < BUTTON_DEBOUNCE_MS);
 }
 
+void contact_init(contact_t *c)
+{
+    c->is_on = 0;
+    c->other_ms = BUTTON_DEBOUNCE_MS;
+}
+
+uint16_t contact_settled(contact_t *c, uint16_t on, uint16_t elapsed_ms)
+{
+    const uint16_t level = (uint16_t)(on != 0u), other_ms = (uint16_t)(c->other_ms + elapsed_ms);
+    c->other_ms = 0;
+    if (level != c->is_on) {
+        if (other_ms >= BUTTON_DEBOUNCE_MS) {
+            c->is_on = level;
+        } else {
+            c->other_ms = other_ms;
+        }
+    }
+    return c->is_on;
+}
+
 void pot_init(pot_t *pot)
 {
     pot->now_q15 = INT16_MIN;

@@ -44,8 +44,9 @@ uint16_t app_may_pass(uint16_t fault) APP_CALLS;
 
 /** Bits of app_told_t.inputs: on while the pin is on, as its row of the board file says. */
 enum {
-    APP_S2 = 1, /**< button S2 is down */
-    APP_S3 = 2  /**< button S3 is down */
+    APP_S2 = 1,       /**< button S2 is down */
+    APP_S3 = 2,       /**< button S3 is down */
+    APP_DIRECTION = 4 /**< the direction input is on, debounced; never with DIRECTION_INPUT_USED 0 */
 };
 
 /** Bits of app_asks_t.outputs. */
@@ -76,7 +77,7 @@ typedef struct {
     int16_t bus_q15;             /**< supply, counts of APP_VOLT() */
     uint16_t inputs;             /**< bits APP_S2, ... */
     uint16_t pot_q16;            /**< potentiometer's share of its travel, smoothed from 0 at power-up, APP_SHARE(); in BIDIRECTIONAL_SPEED from its middle */
-    int16_t towards;             /**< 1 or -1: the direction of the potentiometer's side in BIDIRECTIONAL_SPEED, else 1 */
+    int16_t towards;             /**< 1 or -1: the direction of the potentiometer's side in BIDIRECTIONAL_SPEED, else 1; APP_DIRECTION turns it round */
     uint16_t pot_is_lost;        /**< 1: its signal is where no position is, POT_LIVE_ZERO */
     app_range_t slow;            /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
     app_range_t fast;            /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */

@@ -3,6 +3,7 @@
 #define BOARD_FIRMWARE_H
 
 #include "drive/drive.h"
+#include "drive/limits.h"
 #include "drive/modes/mode_table.h"
 #include "drive/request.h"
 
@@ -20,6 +21,9 @@ extern request_t board_request;
 
 /** What is left of the retries, and what began them. */
 extern retry_t board_retry;
+
+/** The brake chopper. */
+extern chopper_t board_chopper;
 
 #if SCOPE
 /** What a client on the serial line asks of the drive. */

@@ -24,6 +24,16 @@
 #define BOARD_PIN_UART_RX C, 4   /* serial line, receives; one other program for this board, its board unknown [?] */
 #define BOARD_PIN_LED_ALIVE C, 6 /* LED: alive, fault code; [?] a free pin until it is known */
 #define BOARD_PIN_LED_RUN C, 7   /* LED: running; [?] a free pin until it is known */
+/* The next four are used where the parameter of userparams.h says so; a board's switches for them need pull-downs, so that a chip in reset leaves them off. */
+#define BOARD_PIN_DIRECTION A, 4      /* direction input, DIRECTION_INPUT_USED, with the chip's pull-up; [?] a free pin */
+#define BOARD_PIN_FAULT_OUTPUT A, 7   /* relay: fault, FAULT_OUTPUT_USED; [?] a free pin */
+#define BOARD_PIN_RUNNING_OUTPUT A, 10 /* relay: running, RUNNING_OUTPUT_USED; [?] a free pin */
+#define BOARD_PIN_CHOPPER A, 9        /* brake resistor's switch, BRAKE_CHOPPER_V; [?] a free pin */
+/* Their levels when on. A fault is low: its relay is held by a high pin and drops with a fault, a chip in reset, or no supply. */
+#define BOARD_LEVEL_DIRECTION 0u      /* turns the direction round: a contact to ground; an open one, or a broken wire, is forward */
+#define BOARD_LEVEL_FAULT_OUTPUT 0u   /* while there is a fault, and from power-up until the first period says that there is none */
+#define BOARD_LEVEL_RUNNING_OUTPUT 1u /* while the bridge conducts */
+#define BOARD_LEVEL_CHOPPER 1u        /* while the brake resistor is on */
 /* The chip fixes the PWM pins; a low side is one bit above its high side. */
 #define BOARD_PIN_PWM_A B, 14 /* PWM of phase A (M1), high side; published code */
 #define BOARD_PIN_PWM_B B, 12 /* PWM of phase B (M2), high side; published code */
@@ -34,6 +44,7 @@ PIN_NEEDS(currents_and_bus_are_AN0_to_2_or_AN3_to_5,
               && PIN_AN(BOARD_PIN_BUS) == PIN_AN(BOARD_PIN_CURRENT_A) + 2);
 PIN_NEEDS(potentiometer_has_an_AN_number, PIN_AN(BOARD_PIN_POT) >= 0);
 PIN_NEEDS(fault_input_has_an_RP_number, PIN_RP(BOARD_PIN_FAULT) >= 0);
+PIN_NEEDS(direction_input_has_a_pull_up, !(DIRECTION_INPUT_USED) || PIN_CN(BOARD_PIN_DIRECTION) >= 0);
 PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(BOARD_PIN_UART_RX) >= 0);
 
 #ifdef __XC16__
@@ -88,6 +99,11 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 #define BOARD_S2_DOWN() PIN_LOW(BOARD_PIN_S2) /* start, stop, clear a fault */
 #define BOARD_S3_DOWN() PIN_LOW(BOARD_PIN_S3) /* speed range */
 
+/* ---- Direction input ---- */
+#define BOARD_DIRECTION_ON() ((DIRECTION_INPUT_USED) && ((PIN_LOW(BOARD_PIN_DIRECTION) == 0u) == (BOARD_LEVEL_DIRECTION != 0u)))
+#define BOARD_CNPU1 ((uint16_t)((DIRECTION_INPUT_USED) ? PIN_CN_MASK(0, BOARD_PIN_DIRECTION) : 0u)) /* pull-ups of CN0 to 15 */
+#define BOARD_CNPU2 ((uint16_t)((DIRECTION_INPUT_USED) ? PIN_CN_MASK(16, BOARD_PIN_DIRECTION) : 0u)) /* and of CN16 to 30 */
+
 /* ---- UART1: 115200 8N1, status lines ---- */
 #define BOARD_U1BRG 86u           /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
 #define BOARD_UART_TX_FUNCTION 3u /* RPnR code of U1TX */
@@ -105,8 +121,20 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
             (bit) = 0; \
         } \
     } while (0)
-/** Directions of a port: its outputs are the LEDs and U1TX; the PWM module takes its pins when it is enabled. */
+/** An output of a row above on (1) or off (0), at its level. */
+#define BOARD_SIGNAL(output, on) BOARD_SWITCH(PIN_LATCH(BOARD_PIN_##output), ((on) != 0u) == (BOARD_LEVEL_##output != 0u))
+/** An output's bit of a port if it is used; and the same if its pin is high while it has this state. */
+#define BOARD_BIT_OF(used, port, ...) ((used) ? PIN_MASK(__VA_ARGS__, port) : 0u)
+#define BOARD_HIGH(used, level, port, ...) BOARD_BIT_OF((used) && (level) != 0u, port, __VA_ARGS__)
+/** Directions of a port: its outputs are the LEDs, U1TX, and what userparams.h asks for; the PWM module takes its pins when it is enabled. */
 #define BOARD_TRIS(port) \
-    ((uint16_t) ~(PIN_MASK(BOARD_PIN_LED_ALIVE, port) | PIN_MASK(BOARD_PIN_LED_RUN, port) | PIN_MASK(BOARD_PIN_UART_TX, port)))
+    ((uint16_t) ~(PIN_MASK(BOARD_PIN_LED_ALIVE, port) | PIN_MASK(BOARD_PIN_LED_RUN, port) | PIN_MASK(BOARD_PIN_UART_TX, port) \
+                  | BOARD_BIT_OF(FAULT_OUTPUT_USED, port, BOARD_PIN_FAULT_OUTPUT) | BOARD_BIT_OF(RUNNING_OUTPUT_USED, port, BOARD_PIN_RUNNING_OUTPUT) \
+                  | BOARD_BIT_OF(CHOPPER_USED, port, BOARD_PIN_CHOPPER)))
+/** Levels of a port's outputs from power-up on: a fault, not running, no brake resistor. */
+#define BOARD_LAT(port) \
+    ((uint16_t)(BOARD_HIGH(FAULT_OUTPUT_USED, BOARD_LEVEL_FAULT_OUTPUT, port, BOARD_PIN_FAULT_OUTPUT) \
+                | BOARD_HIGH(RUNNING_OUTPUT_USED, !BOARD_LEVEL_RUNNING_OUTPUT, port, BOARD_PIN_RUNNING_OUTPUT) \
+                | BOARD_HIGH(CHOPPER_USED, !BOARD_LEVEL_CHOPPER, port, BOARD_PIN_CHOPPER)))
 
 #endif

@@ -55,6 +55,8 @@
 #define SUPPLY_FOLLOWS_Q15 8192     /* [Q15] of its change that the q current for SUPPLY_CURRENT_LIMIT_A takes a step: a quarter | run SCENARIO=rated */
 #define DERATE_LEAST 5              /* [1] MAXIMUM_CURRENT_A over what DERATE_BELOW_V leaves of the driving current at UNDER_VOLTAGE_V | run SCENARIO=fault_undervoltage */
 #define BRAKE_BAND_V 2.0            /* [V] above REGEN_LIMIT_V, over which braking current falls to nothing | run SCENARIO=brake_without_sink */
+#define CHOPPER_BAND_SHARE 0.02     /* [1] of BRAKE_CHOPPER_V, by which the bus falls before the brake resistor is switched off; 2 in messages | run SCENARIO=brake_chopper */
+#define CHOPPER_REST_SHIFT 3        /* [shift] a brake resistor that has had its share rests until an eighth of it is given back | run SCENARIO=brake_chopper */
 #define SALIENCE_LEAST_SHIFT 2      /* [shift] MTPA's d current follows in four steps of 16 periods | run MOTOR=ipm_4pp_24v_2000 */
 #define PARAM_SALIENT_FROM 8.0      /* [1] times the largest current: with more to double the flux MTPA would save less than 0.8 % of it; the tuner reads it | run MOTOR=ipm_4pp_24v_2000 */
 

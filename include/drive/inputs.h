@@ -15,6 +15,18 @@ typedef struct {
 /** 1 once per press. The application calls it, too. */
 uint16_t button_pressed(button_t *b, uint16_t down, uint16_t elapsed_ms) APP_CALLS;
 
+/** A contact: its level counts when it has stood for BUTTON_DEBOUNCE_MS, the first one at once. */
+typedef struct {
+    uint16_t is_on;    /**< the level that counts */
+    uint16_t other_ms; /**< how long the other one has stood */
+} contact_t;
+
+/** Off until the first contact_settled(). */
+void contact_init(contact_t *c);
+
+/** A pass of the background. @param on not 0: the contact is on @return 1 where it counts as on */
+uint16_t contact_settled(contact_t *c, uint16_t on, uint16_t elapsed_ms);
+
 /** Buttons of one background pass. */
 typedef struct {
     uint16_t s2_down, s3_down; /**< not 0: pressed */

@@ -5,7 +5,12 @@
 #include "drive/drive.h"
 
 /** X(bit, name, cause, remedy). Several may hold at once, so each is a bit, which never changes its meaning. */
-#define DRIVE_LIMIT_TABLE(X) \
+#define DRIVE_LIMIT_TABLE(X) DRIVE_LIMIT_TABLE_BARE(X) \
+    X(4096, CHOPPER, "the brake resistor has had BRAKE_CHOPPER_SHARE of the time and rests", \
+      "slow down more gently or less often; raise BRAKE_CHOPPER_SHARE if the resistor bears more")
+
+/** Those of a drive without a brake resistor. */
+#define DRIVE_LIMIT_TABLE_BARE(X) \
     X(1, VOLTAGE, "the voltage vector has reached the circle that the bus allows", \
       "raise the bus, lower speed or load, or give field weakening more current (IDREF_SPEED, FW_TRIM_CURRENT_A)") \
     X(2, CURRENT, "the q current is at what MAXIMUM_CURRENT_A and the d current leave", \
@@ -98,5 +103,26 @@ int16_t bus_sample(int16_t v_bus_raw);
  *  voltage, which the estimator takes for speed. Slots 1, 5, 9, 13, in every state.
  *  @param v_bus_raw the converter's result, any value */
 void bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus_raw);
+
+/* ---- The brake chopper: a resistor on the bus turns into heat what the supply does not take back ----
+ *
+ *     on from V = BRAKE_CHOPPER_V, off 2 % below; the slow work looks, so at the latest two periods late, T = 0.1 ms at 20 kHz
+ *     braking with the current I at the voltage circle feeds I_bus = 3/2 I/sqrt(3), and dV/dt = I_bus/C:
+ *     2.75 A give 2.4 A, with 1000 uF 2.4 V/ms, so the bus rises by at most 0.24 V beyond V
+ *     the resistor takes all of it where R <= V/I_bus, 11 ohm at 26 V; with a larger one REGEN_LIMIT_V holds the rest
+ *
+ * In any time t the resistor is on for at most BRAKE_CHOPPER_SHARE (t + BRAKE_CHOPPER_SEC), whatever the bus reads: a cold one for
+ * SHARE SEC / (1 - SHARE) at once. Then it rests for an eighth of BRAKE_CHOPPER_SEC. */
+
+/** State of the brake chopper. Zero is a valid start: a cold resistor. A reset forgets the time it was on. */
+typedef struct {
+    uint32_t spent_q10; /**< periods * 1024 that the resistor has been on beyond its share */
+    uint16_t ticks;     /**< of the drive, at the last step */
+    uint16_t is_on;     /**< 1: the resistor is on */
+    uint16_t rests;     /**< 1: it has had its share; LIMIT_CHOPPER */
+} chopper_t;
+
+/** A step of the slow work, with the bridge off, too. @param bus_q15 of this moment @param ticks of the drive @return 1 where the resistor is to be on */
+uint16_t bus_chopper(chopper_t *c, int16_t bus_q15, uint16_t ticks);
 
 #endif

@@ -9,7 +9,7 @@
  *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
  *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
 #define PARAM_TABLE(X) PARAM_MOTOR(X) PARAM_BOARD(X) PARAM_SPEEDS(X) PARAM_START(X) PARAM_LIMITS(X) PARAM_LOOPS(X) PARAM_FILTERS(X) \
-    PARAM_FIELD_WEAKENING(X) PARAM_STOP(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_SCOPE(X) PARAM_RETRY(X)
+    PARAM_FIELD_WEAKENING(X) PARAM_STOP(X) PARAM_SIGNALS(X) PARAM_CHOPPER(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_SCOPE(X) PARAM_RETRY(X)
 
 #define PARAM_MOTOR(X) /* Motor, values per phase of the star */ \
     X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
@@ -76,6 +76,16 @@
 
 #define PARAM_STOP(X) /* Stop: what follows when a stop is requested in closed loop */ \
     X(STOP_MODE, "mode", 0, 2, 0, "0: ramp down, then let go; 1: coast, outputs off at once; 2: ramp down to where a short circuit of the winding fits, then short it until the rotor stands")
+
+#define PARAM_SIGNALS(X) /* Inputs and outputs of a product: their pins and levels are rows of include/board/mclv.h */ \
+    X(DIRECTION_INPUT_USED, "switch", 0, 1, 0, "1: an input turns the direction round; 0: its pin stays free") \
+    X(FAULT_OUTPUT_USED, "switch", 0, 1, 0, "1: an output for a relay tells of a fault; 0: its pin stays free") \
+    X(RUNNING_OUTPUT_USED, "switch", 0, 1, 0, "1: an output for a relay is on while the bridge conducts; 0: its pin stays free")
+
+#define PARAM_CHOPPER(X) /* Brake chopper: an output switches a resistor onto the bus. It must come before REGEN_LIMIT_V */ \
+    X(BRAKE_CHOPPER_V, "V", 0, 88, 0, "bus at which the brake resistor is switched on, off again 2 % below; 0: no brake resistor") \
+    X(BRAKE_CHOPPER_SHARE, "1", 0.01, 1, 0.1, "share of time that the brake resistor bears in the mean of BRAKE_CHOPPER_SEC; 1: always") \
+    X(BRAKE_CHOPPER_SEC, "s", 1, 60, 10, "time of that mean: a cold resistor is on for BRAKE_CHOPPER_SHARE of it at once")
 
 #define PARAM_SNAPSHOT(X) /* Snapshot */ \
     X(SNAPDELAY, "periods", 1, 32000, 5, "one row every SNAPDELAY periods") \
@@ -189,7 +199,11 @@
     X(PARAM_F(DERATE_BELOW_V) <= PARAM_F(NOMINAL_BUS_V), PARAM_NAMED(DERATE_BELOW_V) " must be at most " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(REGEN_LIMIT_V > NOMINAL_BUS_V, PARAM_NAMED(REGEN_LIMIT_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(PARAM_F(REGEN_LIMIT_V) + PARAM_F(BRAKE_BAND_V) <= PARAM_F(OVER_VOLTAGE_V), \
-      PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V))
+      PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V)) \
+    X(!CHOPPER_USED || PARAM_F(BRAKE_CHOPPER_V) >= 1.05F * PARAM_F(NOMINAL_BUS_V), \
+      PARAM_NAMED(BRAKE_CHOPPER_V) " must be 0, for no brake resistor, or at least 1.05 * " PARAM_NAMED(NOMINAL_BUS_V) ": it would burn what the supply gives") \
+    X(!CHOPPER_USED || PARAM_F(REGEN_LIMIT_V) >= 1.02F * PARAM_F(BRAKE_CHOPPER_V), \
+      PARAM_NAMED(REGEN_LIMIT_V) " must be at least 1.02 * " PARAM_NAMED(BRAKE_CHOPPER_V) ": the brake resistor comes first, braking is reduced above it")
 
 #define PARAM_RELATION_REST(X) \
     X(!DEFER_DUTIES || (SCOPE) == 0, \

@@ -46,9 +46,9 @@ class Signal:
 @functools.cache
 def chip() -> dict[str, Pin]:
     """Every pin by its port's name."""
-    found = rows("include", "board/pin_table.h", "CHIP_PIN_TABLE", "#number #port #bit #an #rp others")
+    found = rows("include", "board/pin_table.h", "CHIP_PIN_TABLE", "#number #port #bit #an #rp #cn others")
     pins = (Pin(int(number), f"R{port}{bit}", *(None if int(text) < 0 else int(text) for text in (an, rp)), others)
-            for number, port, bit, an, rp, others in found)
+            for number, port, bit, an, rp, _, others in found)
     return {pin.name: pin for pin in pins}
 
 

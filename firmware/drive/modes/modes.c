@@ -111,7 +111,7 @@ mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range)
     mode_range_t range;
 #ifdef TORQUE_MODE
     (void)fast_range;
-    range.low = MODE_TWO_DIRECTIONS; /* never 0 then: the sign is the direction */
+    range.low = MODE_TWO_DIRECTIONS || (DIRECTION_INPUT_USED); /* never 0 then: the sign is the direction */
     range.high = p->current_max_q13;
 #else
     uint16_t fast = (uint16_t)(fast_range && !MODE_TWO_DIRECTIONS);

@@ -61,6 +61,14 @@
 #define PARAM_DERATE_BAND_V PARAM_MAX(PARAM_F(DERATE_BELOW_V) - PARAM_F(UNDER_VOLTAGE_V), 1.0F)
 #define PARAM_DERATE_Q8 ((DERATE_BELOW_V) ? 256.0F * (1.0F - 1.0F / PARAM_F(DERATE_LEAST)) * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / PARAM_F(BUS_Q15(PARAM_DERATE_BAND_V)) : 0.0F)
 
+/** The brake chopper (drive/limits.h): the bus that switches its resistor on and off, the share of time that this bears, and the periods * 1024 that
+ *  it may have been on beyond its share. */
+#define CHOPPER_USED (PARAM_F(BRAKE_CHOPPER_V) > 0.0F)
+#define CHOPPER_ON_Q15 BUS_Q15(BRAKE_CHOPPER_V)
+#define CHOPPER_OFF_Q15 BUS_Q15(PARAM_F(BRAKE_CHOPPER_V) * (1.0F - PARAM_F(CHOPPER_BAND_SHARE)))
+#define CHOPPER_SHARE_Q10 ((uint16_t)(PARAM_F(BRAKE_CHOPPER_SHARE) * 1024.0F + 0.01F))
+#define CHOPPER_MOST_Q10 ((uint32_t)(PARAM_F(CHOPPER_SHARE_Q10) * PARAM_F(BRAKE_CHOPPER_SEC) / PARAM_F(LOOPTIME_SEC)))
+
 /** The fields of drive_params_t that are the protection's, and the limits'. */
 #define PARAM_PROTECTION_INIT \
     .current_max_q13 = CURRENT_Q13(MAXIMUM_CURRENT_A), \
