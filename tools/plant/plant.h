@@ -76,8 +76,10 @@ typedef struct {
 
 typedef struct {
     double voltage_v, resistance_ohm, sinks, capacitance_f, load_a;
+    double brake_ohm;       /* brake resistor, 0: none */
+    bool brake_on;          /* its switch, of this period */
     double bus_v;
-    double bus_a, supply_a; /* means of the last period: bridge, supply */
+    double bus_a, supply_a, brake_a; /* means of the last period: bridge, supply, brake resistor */
 } plant_supply_t;
 
 /* All of it, and the time: of the present PWM period's start, and within that period. */

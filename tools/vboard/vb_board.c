@@ -167,6 +167,7 @@ static void run_period(vb_t *vb)
     chip->cpu.end(chip->cpu.context, period_s);
     chip_end(chip);
     vb->stat.energy_bus_j += plant->inverter.bus_as * plant->supply.bus_v;
+    plant->supply.brake_on = vb_circuit_switch(vb, VB_BRAKE);
     plant_supply_step(&plant->supply, plant->inverter.bus_as, period_s);
     plant->inverter.bus_as = 0.0;
     vb->stat.energy_shaft_j += plant->motor.torque_nms * plant->motor.omega / plant->motor.pole_pairs;

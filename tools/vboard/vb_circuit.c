@@ -4,6 +4,9 @@
 #define REFERENCE_V 3.3
 
 enum { FLTA_RP = 8, LED_PORT = 2, LED_BIT = 6, LEDS = 2 }; /* FLTA1 is on RB8, the LEDs on RC6 and RC7 */
+/* The direction input is RA4, CN0; the outputs of a product are on port A, each with a pull-down before its switch. */
+enum { DIRECTION_BIT = 4, DIRECTION_CN = 0 };
+static const unsigned switch_bit[] = { [VB_FAULT_RELAY] = 7, [VB_RUNNING_RELAY] = 10, [VB_BRAKE] = 9 };
 enum { FLTA_DEAD = 1, FLTA_INVERTED = 2, SWAPPED = 1, FIRST_DEAD = 2 };
 
 /* Is the button S2 (0) or S3 (1) pressed, as its pin sees it? */
@@ -28,11 +31,23 @@ double vb_circuit_led(const vb_t *vb, unsigned led)
     return output && vb->wiring.leds != FIRST_DEAD + (double)led ? (double)chip_ports_pin(&vb->chip, LED_PORT, pin) : 0.0;
 }
 
+bool vb_circuit_switch(const vb_t *vb, unsigned number)
+{
+    unsigned driven_high = CHIP_REG(&vb->chip, LATA) & ~(unsigned)CHIP_REG(&vb->chip, TRISA);
+    return (driven_high >> switch_bit[number] & 1u) != 0;
+}
+
+/* A contact to ground on a pin that nothing but the chip pulls up: without its pull-up the pin falls. */
+static bool direction_is_low(const vb_t *vb)
+{
+    return vb->controls.direction != 0.0 || (CHIP_REG(&vb->chip, CNPU1) >> DIRECTION_CN & 1u) == 0;
+}
+
 /* Levels that the circuits give to the pins when these are inputs; everything else is pulled up. */
 static void levels(void *context, uint16_t level[3])
 {
     const vb_t *vb = context;
-    level[0] = (uint16_t)(0x079Fu & ~(button(vb, 0) ? 1u << 8 : 0u));
+    level[0] = (uint16_t)(0x079Fu & ~(button(vb, 0) ? 1u << 8 : 0u) & ~(direction_is_low(vb) ? 1u << DIRECTION_BIT : 0u));
     level[1] = (uint16_t)(0xFFFFu & ~(button(vb, 1) ? 1u << 4 : 0u) & ~(fault_is_low(vb) ? 1u << FLTA_RP : 0u));
     level[2] = 0x03FFu;
 }

@@ -31,6 +31,9 @@ static double get_trigger_us(const vb_t *vb) { return vb->chip.pwm.trigger_s < P
 static double get_dead_us(const vb_t *vb) { return vb->chip.pwm.leg[0].dead_high_s * 1e6; }
 static double get_led_alive(const vb_t *vb) { return vb_circuit_led(vb, 0); }
 static double get_led_run(const vb_t *vb) { return vb_circuit_led(vb, 1); }
+static double get_fault_relay(const vb_t *vb) { return vb_circuit_switch(vb, VB_FAULT_RELAY) ? 1.0 : 0.0; }
+static double get_running_relay(const vb_t *vb) { return vb_circuit_switch(vb, VB_RUNNING_RELAY) ? 1.0 : 0.0; }
+static double get_brake(const vb_t *vb) { return vb_circuit_switch(vb, VB_BRAKE) ? 1.0 : 0.0; }
 static double get_conversion_us(const vb_t *vb) { return (double)vb->chip.adc.channels * vb->chip.adc.conversion_s * 1e6; }
 
 static double reading_of(const vb_t *vb, unsigned k)
@@ -165,6 +168,8 @@ static const key_entry_t table[] = {
     P("bus.capacitance_f", plant.supply.capacitance_f, 1e-3, 1e-6, 10.0, "F", "bus capacitor"),
     P("bus.load_a", plant.supply.load_a, 0.05, 0.0, 100.0, "A", "what the board itself draws from the bus"),
     P("bus.voltage_v", plant.supply.bus_v, 24.0, 0.0, 200.0, "V", "bus voltage, now"),
+    P("bus.brake_ohm", plant.supply.brake_ohm, 0.0, 0.0, 1000.0, "ohm", "brake resistor, 0 = none"),
+    R("bus.brake_a", plant.supply.brake_a, "A", "current of the brake resistor, mean of the last period"),
     R("bus.current_a", plant.supply.bus_a, "A", "current from the bus into the bridge, mean of the last period"),
     /* bridge */
     P("inverter.rds_on_ohm", plant.inverter.rds_on_ohm, 0.02, 1e-4, 100.0, "ohm", "on-resistance of a transistor"),
@@ -226,6 +231,7 @@ static const key_entry_t table[] = {
     I("input.s3", controls.s3, 0.0, 0.0, 1.0, "", "button S3, 1 = pressed"),
     P("input.pot", controls.pot, 0.0, 0.0, 1.0, "", "potentiometer, 0 left to 1 right"),
     P("input.pot_live_zero", controls.pot_zero, 0.0, 0.0, 0.4, "", "share of its range that the potentiometer's signal keeps from each rail; a scenario takes the header's POT_LIVE_ZERO"),
+    I("input.direction", controls.direction, 0.0, 0.0, 1.0, "", "contact to ground at the direction input, 1 = closed"),
     I("input.flta", controls.flta, 0.0, 0.0, 1.0, "", "1 = an external circuit holds FLTA1 active"),
     /* CPU */
     P("cpu.isr_us", chip.adc.hold_us, VB_ISR_US, 0.0, 1000.0, "us", "time from the ADC interrupt to the moment when the handler's writes act, 0.5 of a header with deferred duties; on a target image what exceeds 13 holds the interrupt up"),
@@ -275,6 +281,9 @@ static const key_entry_t table[] = {
     G("pwm.fault_pin", get_fault_pin, "", "1 = the fault input is active"),
     G("led.alive", get_led_alive, "", "1 = the first LED is on"),
     G("led.run", get_led_run, "", "1 = the second LED is on"),
+    G("output.fault_relay", get_fault_relay, "", "1 = the fault output's relay is held; 0 = it has dropped: a fault, a chip in reset, or an output that is not used"),
+    G("output.running_relay", get_running_relay, "", "1 = the running output's relay is on"),
+    G("output.brake", get_brake, "", "1 = the brake resistor is switched on"),
     R("uart.baud", chip.uart.baud, "1/s", "UART1 baud rate of the last character, 0 = none yet"),
     R("uart.lost_count", chip.uart.lost, "", "characters lost by a full buffer"),
     /* plant at the last sampling instant */
@@ -304,6 +313,7 @@ static const key_entry_t table[] = {
     G("stat.torque_mean_nm", get_torque_mean, "N.m", "mean electromagnetic torque"),
     R("stat.energy_supply_j", stat.energy_supply_j, "J", "energy from the supply"),
     R("stat.energy_bus_j", stat.energy_bus_j, "J", "energy from the bus into the bridge"),
+    R("stat.energy_brake_j", stat.energy_brake_j, "J", "heat in the brake resistor"),
     R("stat.energy_copper_j", stat.energy_copper_j, "J", "heat in the windings"),
     R("stat.energy_shaft_j", stat.energy_shaft_j, "J", "mechanical energy from the magnetic field, friction included"),
 };

@@ -51,6 +51,7 @@ void vb_stat_collect(vb_t *vb, double h_s)
     t->v2_sum += m->vd_v * m->vd_v + m->vq_v * m->vq_v;
     t->torque_sum += m->torque_nm;
     t->energy_supply_j += vb->plant.supply.supply_a * vb->plant.supply.bus_v * h_s;
+    t->energy_brake_j += vb->plant.supply.brake_a * vb->plant.supply.bus_v * h_s;
     t->energy_copper_j += m->copper_w * h_s;
     for (unsigned k = 0; k < 3; k++) {
         t->i_peak_a = plant_max(t->i_peak_a, fabs(vb->plant.inverter.i[k]));

@@ -10,7 +10,7 @@ enum { VB_UART_TX = 4096, VB_UART_RX = 256, VB_WARNINGS = 48, VB_TEXT = 200 };
 
 /* Buttons, potentiometer, and who pulls the fault pin (vb_circuit.c). */
 typedef struct {
-    double s2, s3, pot, pot_zero, flta;
+    double s2, s3, pot, pot_zero, flta, direction;
     bool comparator; /* the over-current comparator */
     double trips;
 } vb_controls_t;
@@ -75,7 +75,7 @@ typedef struct {
 typedef struct {
     double bus_max_v, bus_min_v, i_peak_a, speed_max_rpm, speed_min_rpm;
     double periods, speed_sum, i2_sum, torque_sum, v2_sum;
-    double energy_bus_j, energy_supply_j, energy_copper_j, energy_shaft_j;
+    double energy_bus_j, energy_brake_j, energy_supply_j, energy_copper_j, energy_shaft_j;
 } vb_stat_t;
 
 struct vb {
@@ -116,6 +116,8 @@ double vb_keys_read(const vb_t *vb, const vb_access_t *access);
 extern const chip_board_t vb_circuit;
 void vb_circuit_comparator(vb_t *vb, bool period_start);
 double vb_circuit_led(const vb_t *vb, unsigned led);
+enum { VB_FAULT_RELAY, VB_RUNNING_RELAY, VB_BRAKE }; /* switches behind the outputs of a product, which a pin closes while it drives high */
+bool vb_circuit_switch(const vb_t *vb, unsigned number);
 
 /* vb_serial.c */
 void vb_serial_send(void *vb, uint8_t character);
