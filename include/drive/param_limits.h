@@ -200,9 +200,9 @@
     X(REGEN_LIMIT_V > NOMINAL_BUS_V, PARAM_NAMED(REGEN_LIMIT_V) " must be above " PARAM_NAMED(NOMINAL_BUS_V)) \
     X(PARAM_F(REGEN_LIMIT_V) + PARAM_F(BRAKE_BAND_V) <= PARAM_F(OVER_VOLTAGE_V), \
       PARAM_NAMED(REGEN_LIMIT_V) " + 2 V must be at most " PARAM_NAMED(OVER_VOLTAGE_V)) \
-    X(!CHOPPER_USED || PARAM_F(BRAKE_CHOPPER_V) >= 1.05F * PARAM_F(NOMINAL_BUS_V), \
+    X(PARAM_F(BRAKE_CHOPPER_V) <= 0.0F || PARAM_F(BRAKE_CHOPPER_V) >= 1.05F * PARAM_F(NOMINAL_BUS_V), \
       PARAM_NAMED(BRAKE_CHOPPER_V) " must be 0, for no brake resistor, or at least 1.05 * " PARAM_NAMED(NOMINAL_BUS_V) ": it would burn what the supply gives") \
-    X(!CHOPPER_USED || PARAM_F(REGEN_LIMIT_V) >= 1.02F * PARAM_F(BRAKE_CHOPPER_V), \
+    X(PARAM_F(BRAKE_CHOPPER_V) <= 0.0F || PARAM_F(REGEN_LIMIT_V) >= 1.02F * PARAM_F(BRAKE_CHOPPER_V), \
       PARAM_NAMED(REGEN_LIMIT_V) " must be at least 1.02 * " PARAM_NAMED(BRAKE_CHOPPER_V) ": the brake resistor comes first, braking is reduced above it")
 
 #define PARAM_RELATION_REST(X) \

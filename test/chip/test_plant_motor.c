@@ -380,6 +380,47 @@ void test_braking_a_spinning_motor_raises_a_bus_whose_supply_cannot_sink(void)
     TEST_ASSERT_TRUE(held_v < 24.2);
 }
 
+/** The brake's switch is RA9. */
+static void set_brake(bool on)
+{
+    set("reg.TRISA", 0x079F & ~(1 << 9));
+    set("reg.LATA", on ? 1 << 9 : 0);
+}
+
+void test_a_brake_resistor_takes_V_over_R_while_its_pin_drives_high(void)
+{
+    fake_override = 0x0000;
+    power_up();
+    set("bus.brake_ohm", 12.0);
+    set_brake(true);
+    run(400);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, get("bus.voltage_v") / 12.0, get("bus.brake_a"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, 2.0, get("bus.brake_a") * 24.0 / get("bus.voltage_v"));
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, get("bus.brake_a") + 0.05, get("supply.current_a"));
+    set_brake(false);
+    run(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, get("bus.brake_a"));
+    set("reg.LATA", 1 << 9);
+    set("reg.TRISA", 0x079F); /* a pull-down holds it */
+    run(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, get("bus.brake_a"));
+}
+
+void test_a_brake_resistor_discharges_the_bus_as_R_and_C_do_and_its_heat_is_the_capacitor_s_energy(void)
+{
+    fake_override = 0x0000;
+    power_up();
+    set("bus.load_a", 0.0);
+    set("supply.voltage_v", 0.0);
+    set("bus.brake_ohm", 10.0);
+    set_brake(true);
+    set("stat.reset", 1.0);
+    run(200); /* 10 ms, R C */
+    double v = get("bus.voltage_v");
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, 24.0 / 2.71828, v);
+    TEST_ASSERT_DOUBLE_WITHIN(0.003, 0.5e-3 * (24.0 * 24.0 - v * v), get("stat.energy_brake_j"));
+}
+
 void test_energy_from_the_supply_is_found_again_as_heat_work_and_stored_energy(void)
 {
     make_ideal();

@@ -35,7 +35,7 @@ def test_no_pin_is_there_twice_and_the_pwm_s_are_rb10_to_15():
 
 
 def test_the_firmware_s_pins_are_all_told():
-    assert len(pins.firmware()) == len(re.findall(r"^#define BOARD_PIN_", HEADER, re.MULTILINE)) == 14
+    assert len(pins.firmware()) == len(re.findall(r"^#define BOARD_PIN_", HEADER, re.MULTILINE)) == 18
     assert (pins.firmware()["fault"].pin, pins.firmware()["fault"].known_from) == ("RB8", "published code")
 
 
@@ -80,7 +80,7 @@ def test_a_pin_that_cannot_do_it_is_refused_with_its_line(load, line, parts):
 
 
 # ---- builds --------------------------------------------------------------------------------------------------------------------
-def built(folder, *changes: tuple[str, str], holds: str = "1") -> str:
+def built(folder, *changes: tuple[str, str], holds: str = "1", defines: tuple[str, ...] = ()) -> str:
     """What the compiler says to the firmware's pins with lines of mclv.h replaced, and to a condition on its registers."""
     text = HEADER
     for name, value in changes:
@@ -88,7 +88,7 @@ def built(folder, *changes: tuple[str, str], holds: str = "1") -> str:
         assert count == 1
     (folder / "board").mkdir(exist_ok=True)
     (folder / "board" / "mclv.h").write_text(text, encoding="utf-8")
-    arguments = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", f"-I{folder}", "-Itools/cpu_host", "-Iinclude", "-I.",
+    arguments = ["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", *defines, f"-I{folder}", "-Itools/cpu_host", "-Iinclude", "-I.",
                  "firmware/board/peripherals.c", "-xc", "-"]
     source = f'#include "board/mclv.h"\nPIN_NEEDS(registers, {holds});\n'
     return subprocess.run([*COMPILER, *arguments], input=source, cwd=paths.ROOT, capture_output=True, text=True, check=False).stderr
@@ -114,3 +114,24 @@ def test_firmware_for_other_pins_builds_and_what_the_chip_cannot_do_fails_by_nam
 def test_the_registers_follow_from_the_pins(tmp_path, changes, registers):
     assert built(tmp_path, *changes, holds=registers) == ""
     assert "registers" in built(tmp_path, *changes, holds=f"!({registers})")
+
+
+PRODUCT = ("-DDIRECTION_INPUT_USED=1", "-DFAULT_OUTPUT_USED=1", "-DRUNNING_OUTPUT_USED=1", "-DBRAKE_CHOPPER_V=26")
+
+
+@pytest.mark.parametrize("changes, defines, registers", [
+    ((), PRODUCT, "BOARD_TRIS(A) == 0xF97F && BOARD_TRIS(C) == 0xFF37 && BOARD_LAT(A) == 0 && BOARD_LAT(B) == 0 && BOARD_CNPU1 == 1 && BOARD_CNPU2 == 0"),
+    ((), PRODUCT[1:2], "BOARD_TRIS(A) == 0xFF7F && BOARD_LAT(A) == 0 && BOARD_CNPU1 == 0"),
+    ((), PRODUCT[2:3], "BOARD_TRIS(A) == 0xFBFF"), ((), PRODUCT[3:], "BOARD_TRIS(A) == 0xFDFF"), ((), PRODUCT[:1], "BOARD_TRIS(A) == 0xFFFF"),
+    ((("BOARD_LEVEL_FAULT_OUTPUT", "1u"), ("BOARD_LEVEL_RUNNING_OUTPUT", "0u"), ("BOARD_LEVEL_CHOPPER", "0u"), ("BOARD_PIN_RUNNING_OUTPUT", "B, 7"),
+      ("BOARD_PIN_CHOPPER", "C, 9"), ("BOARD_PIN_DIRECTION", "C, 8")), PRODUCT,
+     "BOARD_TRIS(A) == 0xFF7F && BOARD_TRIS(B) == 0xFF7F && BOARD_TRIS(C) == 0xFD37 && BOARD_LAT(A) == 0x80 && BOARD_LAT(B) == 0x80 && BOARD_LAT(C) == 0x200"
+     " && BOARD_CNPU1 == 0 && BOARD_CNPU2 == 0x10")])
+def test_the_registers_of_a_product_s_pins_and_their_levels_at_power_up(tmp_path, changes, defines, registers):
+    assert built(tmp_path, *changes, holds=registers, defines=defines) == ""
+    assert "registers" in built(tmp_path, *changes, holds=f"!({registers})", defines=defines)
+
+
+def test_a_direction_input_without_the_chip_s_pull_up_fails_by_name(tmp_path):
+    pin = ("BOARD_PIN_DIRECTION", "A, 9")
+    assert "direction_input_has_a_pull_up" in built(tmp_path, pin, defines=PRODUCT) and built(tmp_path, pin) == ""

@@ -73,10 +73,10 @@ def add_fault(tree: Tree) -> None:
 
 
 def add_limit(tree: Tree) -> None:
-    tree.row("include/drive/limits.h", "DRIVE_LIMIT_TABLE", 'X(4096, BELT, "the belt slips", "tighten the belt")')
+    tree.row("include/drive/limits.h", "DRIVE_LIMIT_TABLE", 'X(8192, BELT, "the belt slips", "tighten the belt")')
     tree.at_end("firmware/drive/limits.c", "limits_reasons", "found |= (d->ticks == 7u) ? (uint16_t)LIMIT_BELT : 0u;")
-    tree.compile("LIMIT_BELT == 4096")
-    assert "| 4096 | BELT | the belt slips | tighten the belt |" in tree.page("limits")
+    tree.compile("LIMIT_BELT == 8192")
+    assert "| 8192 | BELT | the belt slips | tighten the belt |" in tree.page("limits")
     tree.passes("test/unit/test_fault_page.py")
 
 

@@ -1,4 +1,5 @@
 /* The application fixed_speed: it starts by itself, and how often and when it tries again. */
+/* defines: -DDIRECTION_INPUT_USED=1 */
 #include "firmware/app/fixed_speed.c"
 
 #include "app_rig.h"
@@ -18,6 +19,16 @@ void test_it_runs_from_the_first_call_on_at_its_one_speed(void)
     TEST_ASSERT_EQUAL_INT16(1, asks.run);
     TEST_ASSERT_EQUAL_INT16(APP_RPM(FIXED_RPM), asks.target_erpm);
     told.pot_q16 = 65535;
+    rig_ms();
+    TEST_ASSERT_EQUAL_INT16(APP_RPM(FIXED_RPM), asks.target_erpm);
+}
+
+void test_the_direction_input_turns_its_speed_round(void)
+{
+    told.inputs = APP_S2 | APP_S3 | APP_DIRECTION;
+    rig_ms();
+    TEST_ASSERT_EQUAL_INT16(-APP_RPM(FIXED_RPM), asks.target_erpm);
+    told.inputs = APP_S2 | APP_S3;
     rig_ms();
     TEST_ASSERT_EQUAL_INT16(APP_RPM(FIXED_RPM), asks.target_erpm);
 }

@@ -153,6 +153,10 @@ RELATIONS = {
     "DERATE_BELOW_V must be at most NOMINAL_BUS_V": [case("DERATE_BELOW_V", "24.1", "24")],
     "REGEN_LIMIT_V must be above NOMINAL_BUS_V": [case("REGEN_LIMIT_V", "24.0", "24.1")],
     "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V": [case("REGEN_LIMIT_V", "32.1", "31.9")],
+    "BRAKE_CHOPPER_V must be 0, for no brake resistor, or at least 1.05 * NOMINAL_BUS_V": [
+        case("BRAKE_CHOPPER_V", "25.1", "25.2"), case("BRAKE_CHOPPER_V", "0.5", "0"), case("NOMINAL_BUS_V", "24.8", "24.7", BRAKE_CHOPPER_V="26")],
+    "REGEN_LIMIT_V must be at least 1.02 * BRAKE_CHOPPER_V": [
+        case("BRAKE_CHOPPER_V", "26.5", "26.4"), case("REGEN_LIMIT_V", "30.5", "30.7", BRAKE_CHOPPER_V="30")],
     "UNDER_VOLTAGE_V is too low for the modulator's division": [case("LOOPTIME_SEC", "0.0002", "0.00014")],
     "SAMPLE_WINDOW_SEC must be at least DEADTIME_SEC + 1 us": [
         case("DEADTIME_SEC", "0.00000213", "0.0000021"),

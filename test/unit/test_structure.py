@@ -95,7 +95,7 @@ PREFIXES = {
     "drive/modes/identify": "identify mode",
     "drive/modes/modes": "mode snapshot",
     "drive/modes/profile": "mode profile",
-    "drive/inputs": "button pot",
+    "drive/inputs": "button contact pot",
     "drive/request": "request retry",
     "drive/protection": "overload protection",
     "drive/speed": "reference speed",

@@ -63,7 +63,7 @@
 
 /** The brake chopper (drive/limits.h): the bus that switches its resistor on and off, the share of time that this bears, and the periods * 1024 that
  *  it may have been on beyond its share. */
-#define CHOPPER_USED (PARAM_F(BRAKE_CHOPPER_V) > 0.0F)
+#define CHOPPER_USED ((int)(BRAKE_CHOPPER_V) > 0)
 #define CHOPPER_ON_Q15 BUS_Q15(BRAKE_CHOPPER_V)
 #define CHOPPER_OFF_Q15 BUS_Q15(PARAM_F(BRAKE_CHOPPER_V) * (1.0F - PARAM_F(CHOPPER_BAND_SHARE)))
 #define CHOPPER_SHARE_Q10 ((uint16_t)(PARAM_F(BRAKE_CHOPPER_SHARE) * 1024.0F + 0.01F))
