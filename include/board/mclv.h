@@ -25,10 +25,10 @@
 #define BOARD_PIN_LED_ALIVE C, 6 /* LED: alive, fault code; [?] a free pin until it is known */
 #define BOARD_PIN_LED_RUN C, 7   /* LED: running; [?] a free pin until it is known */
 /* The next four are used where the parameter of userparams.h says so; a board's switches for them need pull-downs, so that a chip in reset leaves them off. */
-#define BOARD_PIN_DIRECTION A, 4      /* direction input, DIRECTION_INPUT_USED, with the chip's pull-up; [?] a free pin */
-#define BOARD_PIN_FAULT_OUTPUT A, 7   /* relay: fault, FAULT_OUTPUT_USED; [?] a free pin */
+#define BOARD_PIN_DIRECTION A, 4       /* direction input, DIRECTION_INPUT_USED, with the chip's pull-up; [?] a free pin */
+#define BOARD_PIN_FAULT_OUTPUT A, 7    /* relay: fault, FAULT_OUTPUT_USED; [?] a free pin */
 #define BOARD_PIN_RUNNING_OUTPUT A, 10 /* relay: running, RUNNING_OUTPUT_USED; [?] a free pin */
-#define BOARD_PIN_CHOPPER A, 9        /* brake resistor's switch, BRAKE_CHOPPER_V; [?] a free pin */
+#define BOARD_PIN_CHOPPER A, 9         /* brake resistor's switch, BRAKE_CHOPPER_V; [?] a free pin */
 /* Their levels when on. A fault is low: its relay is held by a high pin and drops with a fault, a chip in reset, or no supply. */
 #define BOARD_LEVEL_DIRECTION 0u      /* turns the direction round: a contact to ground; an open one, or a broken wire, is forward */
 #define BOARD_LEVEL_FAULT_OUTPUT 0u   /* while there is a fault, and from power-up until the first period says that there is none */
@@ -101,7 +101,7 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 
 /* ---- Direction input ---- */
 #define BOARD_DIRECTION_ON() ((DIRECTION_INPUT_USED) && ((PIN_LOW(BOARD_PIN_DIRECTION) == 0u) == (BOARD_LEVEL_DIRECTION != 0u)))
-#define BOARD_CNPU1 ((uint16_t)((DIRECTION_INPUT_USED) ? PIN_CN_MASK(0, BOARD_PIN_DIRECTION) : 0u)) /* pull-ups of CN0 to 15 */
+#define BOARD_CNPU1 ((uint16_t)((DIRECTION_INPUT_USED) ? PIN_CN_MASK(0, BOARD_PIN_DIRECTION) : 0u))  /* pull-ups of CN0 to 15 */
 #define BOARD_CNPU2 ((uint16_t)((DIRECTION_INPUT_USED) ? PIN_CN_MASK(16, BOARD_PIN_DIRECTION) : 0u)) /* and of CN16 to 30 */
 
 /* ---- UART1: 115200 8N1, status lines ---- */

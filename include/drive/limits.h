@@ -5,7 +5,8 @@
 #include "drive/drive.h"
 
 /** X(bit, name, cause, remedy). Several may hold at once, so each is a bit, which never changes its meaning. */
-#define DRIVE_LIMIT_TABLE(X) DRIVE_LIMIT_TABLE_BARE(X) \
+#define DRIVE_LIMIT_TABLE(X) \
+    DRIVE_LIMIT_TABLE_BARE(X) \
     X(4096, CHOPPER, "the brake resistor has had BRAKE_CHOPPER_SHARE of the time and rests", \
       "slow down more gently or less often; raise BRAKE_CHOPPER_SHARE if the resistor bears more")
 

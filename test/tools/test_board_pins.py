@@ -27,6 +27,11 @@ def test_the_table_has_the_pins_that_the_virtual_chip_has():
         rp: f"RB{rp}" if rp < 16 else f"RC{rp - 16}" for rp in range(26)}
 
 
+def test_each_change_notice_is_on_one_pin():
+    assert sorted(pin.cn for pin in pins.chip().values() if pin.cn is not None) == list(range(31))
+    assert [name for name, pin in pins.chip().items() if pin.cn is None] == ["RA10", "RA7", "RA8", "RA9"]
+
+
 def test_no_pin_is_there_twice_and_the_pwm_s_are_rb10_to_15():
     numbers = [pin.number for pin in pins.chip().values()]
     assert len(set(numbers)) == len(numbers) == 35 and max(numbers) == 44
@@ -70,6 +75,7 @@ def test_a_pin_may_be_told_by_any_of_its_names_and_what_differs_is_a_line_of_mcl
 @pytest.mark.parametrize("line, parts", [
     ('falt = "RB9"', ["unknown key 'falt'", "did you mean 'fault'?"]), ('fault = 8', ["'fault' is not a text"]), ('fault = "RD1"', ["'RD1' is no pin"]),
     ('fault = "RA8"', ["fault cannot be on RA8", "a pin with an RP number: RB9,"]), ('uart_rx = "RA9"', ["a pin with an RP number"]),
+    ('direction = "RA7"', ["direction cannot be on RA7", "the chip's pull-up: any but RA7 to RA10"]), ('chopper = "RA4"', ["chopper and direction are both on RA4"]),
     ('pot = "RB8"', ["pot cannot be on RB8", "an analogue input: RA0,"]), ('s2 = "RA2"', ["the crystal is there"]),
     ('led_run = "RB15"', ["the PWM module drives this pin"]), ('pwm_b = "RB14"', ["the chip fixes its PWM pins"]),
     ('fault = "RA0"', ["an RP number"]), ('pot = "RA0"', ["pot and current_a are both on RA0"]), ('s2 = "RB4"', ["s2 and s3 are both on RB4"]),

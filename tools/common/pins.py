@@ -25,6 +25,8 @@ class Pin:
     """of the port, e.g. RB8"""
     an: int | None
     rp: int | None
+    cn: int | None
+    """change notice, with the chip's pull-up"""
     others: str
 
     @property
@@ -47,8 +49,8 @@ class Signal:
 def chip() -> dict[str, Pin]:
     """Every pin by its port's name."""
     found = rows("include", "board/pin_table.h", "CHIP_PIN_TABLE", "#number #port #bit #an #rp #cn others")
-    pins = (Pin(int(number), f"R{port}{bit}", *(None if int(text) < 0 else int(text) for text in (an, rp)), others)
-            for number, port, bit, an, rp, _, others in found)
+    pins = (Pin(int(number), f"R{port}{bit}", *(None if int(text) < 0 else int(text) for text in (an, rp, cn)), others)
+            for number, port, bit, an, rp, cn, others in found)
     return {pin.name: pin for pin in pins}
 
 
@@ -94,6 +96,8 @@ def _problem(key: str, pin: Pin) -> str:
         return "choose a pin with an analogue input: " + ", ".join(other.name for other in chip().values() if other.an is not None)
     if key in REMAPPED and pin.rp is None:
         return "choose a pin with an RP number: " + ", ".join(other.name for other in chip().values() if other.rp is not None)
+    if key == "direction" and pin.cn is None:
+        return "choose a pin with the chip's pull-up: any but RA7 to RA10"
     if key in PWM and PWM[key] not in pin.others:
         return "the chip fixes its PWM pins: A on RB14 and RB15, B on RB12 and RB13, C on RB10 and RB11; swap the motor's wires instead"
     if key not in PWM and "PWM1" in pin.others:
