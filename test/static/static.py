@@ -20,7 +20,7 @@ BUILD = Path("build/static")
 MODE_TABLE = Path("include/drive/modes/mode_table.h")
 COMBINED = [("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"),
             ("TUNING", "SELFTEST_OFF"), ("TORQUE_PROFILE", "BIDIRECTIONAL_SPEED", "TORQUE_MODE"), ("TORQUE_MODE", "PARAMS_IN_RAM"), ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"),
-            ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT")]
+            ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT"), ("DIRECTION_INPUT_USED", "FAULT_OUTPUT_USED", "RUNNING_OUTPUT_USED", "BRAKE_CHOPPER_V=26")]
 ON_TARGET = ("__XC16__",)
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
     -Wstrict-prototypes -Wmissing-prototypes -Wswitch-default -Wlogical-op -Wduplicated-cond -Wduplicated-branches -Wvla -Wtype-limits
@@ -101,7 +101,7 @@ def configurations() -> list[tuple[str, ...]]:
 
 
 def defines(configuration: tuple[str, ...]) -> list[str]:
-    return [f"-D{name}=1" for name in configuration]
+    return [f"-D{name}" if "=" in name else f"-D{name}=1" for name in configuration]
 
 
 def preprocessed(source: str, options: list[str]) -> frozenset[tuple[str, int, str]]:

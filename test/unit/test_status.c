@@ -1,6 +1,9 @@
 /* The status line: its text, its rhythm, and a transmitter that is sometimes full. */
 #include "hurst_params.h"
 
+#undef BRAKE_CHOPPER_V
+#define BRAKE_CHOPPER_V 26 /* with its reason */
+
 #include "firmware/board/status.c"
 
 #include <string.h>
