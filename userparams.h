@@ -184,6 +184,24 @@
 #define RETRY_PAUSE_SEC 2           /* [s]             0.5 .. 600     outputs off before each retry; S2 ends it */
 #define RETRY_FORGET_SEC 10         /* [s]             1 .. 3600      in closed loop without a fault gives the retries back */
 
+/* ---- Temperatures: an NTC thermistor from its input to ground, a resistor from there to 3.3 V --------------------- */
+#ifndef MOTOR_NTC_USED /* or build with -DMOTOR_NTC_USED=1 */
+#define MOTOR_NTC_USED 0            /* [switch]        0 .. 1         1: there is one in the motor; 0: none, and the rows about it mean nothing */
+#endif
+#define MOTOR_NTC_OHM 10000         /* [ohm]           100 .. 1000000 its resistance at 25 degrees Celsius */
+#define MOTOR_NTC_BETA_K 3435       /* [K]             2000 .. 5000   its B: R = MOTOR_NTC_OHM exp(B (1/T - 1/298.15 K)) */
+#define MOTOR_NTC_DIVIDER_OHM 10000 /* [ohm]           100 .. 1000000 the resistor to 3.3 V */
+#define MOTOR_DERATE_C 110          /* [C]             0 .. 145       motor warmer than this has its driving current reduced, to a fifth of MAXIMUM_CURRENT_A at MOTOR_TRIP_C */
+#define MOTOR_TRIP_C 130            /* [C]             20 .. 150      motor that warm trips, and stays off until it is 10 K cooler */
+#ifndef BRIDGE_NTC_USED /* or build with -DBRIDGE_NTC_USED=1 */
+#define BRIDGE_NTC_USED 0           /* [switch]        0 .. 1         1: there is one at the bridge; 0: none, and the rows about it mean nothing */
+#endif
+#define BRIDGE_NTC_OHM 10000        /* [ohm]           100 .. 1000000 its resistance at 25 degrees Celsius */
+#define BRIDGE_NTC_BETA_K 3435      /* [K]             2000 .. 5000   its B */
+#define BRIDGE_NTC_DIVIDER_OHM 10000 /* [ohm]           100 .. 1000000 the resistor to 3.3 V */
+#define BRIDGE_DERATE_C 80          /* [C]             0 .. 145       bridge warmer than this has the driving current reduced, to a fifth of MAXIMUM_CURRENT_A at BRIDGE_TRIP_C */
+#define BRIDGE_TRIP_C 100           /* [C]             20 .. 150      bridge that warm trips, and stays off until it is 10 K cooler */
+
 /* ---- What the firmware makes of these numbers: engineering value, its count, and how much rounding changes it -----
  * U0 = 0.000405949 V and I0 = 0.000134277 A per count of Q15 (full scale 13.3 V, 4.4 A)
  *

@@ -200,6 +200,33 @@ static void limits(void)
     FIELD(dead_emf_q12, PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "what dead time may put into the back-EMF");
 }
 
+/* Temperatures: nothing without a sensor. */
+#if HEAT_USED
+#define NTC_SHARE(stem, n) \
+    (1.0 / (1.0 + stem##_NTC_DIVIDER_OHM / (stem##_NTC_OHM * exp(stem##_NTC_BETA_K * (1.0 / (273.15 + NTC_LEAST_C + NTC_STEP_C * (n)) - 1.0 / 298.15)))))
+#define NTC(field, stem) \
+    FIELD(field.derate_q4, stem##_DERATE_C, "C", 1.0 / 16.0, "Q4 C", "driving current is reduced from here"); \
+    FIELD(field.trip_q4, stem##_TRIP_C, "C", 1.0 / 16.0, "Q4 C", "trips"); \
+    FIELD(field.derate_per_q4_q8, 0.8 * MAXIMUM_CURRENT_A / (stem##_TRIP_C - stem##_DERATE_C), "A/K", q13_a * 16.0 / 256.0, "Q8", "driving current taken off a kelvin"); \
+    NTC_NODE(field, stem, 0); NTC_NODE(field, stem, 1); NTC_NODE(field, stem, 2); NTC_NODE(field, stem, 3); NTC_NODE(field, stem, 4); \
+    NTC_NODE(field, stem, 5); NTC_NODE(field, stem, 6); NTC_NODE(field, stem, 7); NTC_NODE(field, stem, 8); NTC_NODE(field, stem, 9); \
+    NTC_NODE(field, stem, 10); NTC_NODE(field, stem, 11); NTC_NODE(field, stem, 12)
+#define NTC_NODE(field, stem, n) FIELD(field.share_q16[n], NTC_SHARE(stem, n), "1", 1.0 / 65536.0, "Q16", "share of 3.3 V, 16 K from one to the next, -40 degrees the first")
+#endif
+
+static void temperatures(void)
+{
+#if HEAT_USED
+    GROUP("temperatures");
+#endif
+#if MOTOR_NTC_USED
+    NTC(motor_ntc, MOTOR);
+#endif
+#if BRIDGE_NTC_USED
+    NTC(bridge_ntc, BRIDGE);
+#endif
+}
+
 static void modulator(void)
 {
     double top = (double)p.svm.top / p.svm.full;
@@ -249,6 +276,7 @@ int main(void)
     observer();
     start();
     limits();
+    temperatures();
     modulator();
     field_weakening();
     PARAM_RELATION_TABLE(RELATION)

@@ -47,6 +47,18 @@ static void application_operated(app_told_t *told, uint16_t elapsed_ms)
     told->towards = (int16_t)(turn * told->towards);
 }
 
+/** Temperatures, of the sensors that there are. */
+static void application_tell_heat(app_told_t *told)
+{
+#if MOTOR_NTC_USED
+    told->motor_q4 = board_drive.heat.motor.celsius_q4;
+#endif
+#if BRIDGE_NTC_USED
+    told->bridge_q4 = board_drive.heat.bridge.celsius_q4;
+#endif
+    (void)told;
+}
+
 /** What the application is told of the drive, and what stands. */
 static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapsed_ms)
 {
@@ -66,6 +78,7 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     told->iq_q13 = d->run.control.i_q13.q;
     told->bus_q15 = qm_hi(d->bus_q31);
     application_operated(told, elapsed_ms);
+    application_tell_heat(told);
     told->slow.low = slow.low;
     told->slow.high = slow.high;
     told->fast.low = fast.low;

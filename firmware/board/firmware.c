@@ -32,6 +32,12 @@ retry_t board_retry BOARD_UNSET;
 remote_t scope_command; /* cleared: remote_init() leaves what the client has not written */
 #endif
 
+#if HEAT_USED
+uint16_t board_ch0 BOARD_UNSET;
+static uint16_t ch0_since BOARD_UNSET;  /* drive ticks when it was chosen */
+static uint16_t ch0_bridge BOARD_UNSET; /* 1: after the potentiometer it is the bridge's turn */
+#endif
+
 static uint16_t last_ms_tick BOARD_UNSET; /* drive ticks already counted as milliseconds */
 static judged_t judged BOARD_UNSET;
 
@@ -79,8 +85,50 @@ void firmware_init(void)
     pwm_init();
     firmware_find(board_clock_failed ? (uint16_t)FAULT_CLOCK : (uint16_t)kept);
     adc_init();
+#if HEAT_USED
+    ch0_bridge = 0;
+    firmware_choose_input(BOARD_AD1CHS0);
+#endif
     ClrWdt();
 }
+
+#if HEAT_USED
+#define CH0_SETTLES_TICKS 3u /* the second sample after the change is the new input's for sure */
+
+void firmware_choose_input(uint16_t input)
+{
+    board_ch0 = input;
+    ch0_since = board_drive.ticks;
+    AD1CHS0 = input;
+}
+
+/** Takes the sample of CH0's input once it is its own, and turns to the next: the potentiometer every second time, the sensors between. Every
+ *  millisecond, after selftest_ms() has held AD1CHS0 against what was chosen; while that looks at the converter itself it has the input. */
+static void firmware_turn_input(void)
+{
+    const int16_t sample_q15 = (int16_t)ADC1BUF0;
+    uint16_t next = BOARD_AD1CHS0;
+    if (board_ch0 == BOARD_AN_OFF || (uint16_t)(board_drive.ticks - ch0_since) < CH0_SETTLES_TICKS) {
+        return;
+    }
+    if (board_ch0 == BOARD_AD1CHS0) {
+        board_pot.now_q15 = sample_q15;
+        ch0_bridge ^= 1u;
+        next = ch0_bridge ? BOARD_CH0_BRIDGE : BOARD_CH0_MOTOR;
+#if MOTOR_NTC_USED
+    } else if (board_ch0 == BOARD_CH0_MOTOR) {
+        ntc_sample(&board_drive.heat.motor, &board_params.motor_ntc, sample_q15);
+#endif
+#if BRIDGE_NTC_USED
+    } else {
+        ntc_sample(&board_drive.heat.bridge, &board_params.bridge_ntc, sample_q15);
+#endif
+    }
+    firmware_choose_input(next);
+}
+#else
+#define firmware_turn_input() ((void)0)
+#endif
 
 /** Control interrupts are as many as the timer says. A background pass that takes longer than a millisecond loses one of the timer's, never of
  *  the interrupts': only too few are a fault. Every millisecond. */
@@ -136,6 +184,9 @@ QM_INLINE void firmware_judge(uint16_t elapsed_ms)
 {
     firmware_find(signals_d_current(&judged.signals, &board_drive, &board_params));
     firmware_find(signals_offset(&judged.signals, &board_drive, &board_params));
+#if HEAT_USED
+    firmware_find(heat_follow(&board_drive, &board_params));
+#endif
     if (overload_tick(&judged.overload, &board_drive, &board_params, elapsed_ms)) {
         firmware_trip(FAULT_OVERTEMPERATURE);
     }
@@ -158,6 +209,7 @@ void firmware_background(void)
         status_tick(elapsed_ms);
         selftest_part(SELFTEST_PART_STATUS);
         selftest_ms();
+        firmware_turn_input();
     }
     status_send();
 }

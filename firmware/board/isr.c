@@ -157,7 +157,9 @@ void BOARD_ISR _T2Interrupt(void)
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
     raw.v_bus = (int16_t)ADC1BUF3;
-    board_pot.now_q15 = (int16_t)ADC1BUF0;
+    if (!HEAT_USED) { /* else CH0 has others, too: firmware_turn_input() */
+        board_pot.now_q15 = (int16_t)ADC1BUF0;
+    }
     if (drive_slow(&board_drive, &board_params, &raw)) {
         if (duties_are_the_laws()) {
             P1OVDCON = BOARD_OUTPUTS_PWM;

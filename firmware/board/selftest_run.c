@@ -55,7 +55,9 @@ static const written_t written[] = {
     { &AD1CON1, 0xA7ECu, BOARD_AD1CON1 | 0x8000u },
     { &AD1CON2, 0xE77Fu, BOARD_AD1CON2 },
     { &AD1CON3, 0x9FFFu, BOARD_AD1CON3 },
+#if !HEAT_USED
     { &AD1CHS0, 0x9F9Fu, BOARD_AD1CHS0 },
+#endif
     { &AD1CHS123, 0x0707u, BOARD_AD1CHS123 },
     { &AD1PCFGL, 0x01FFu, BOARD_AD1PCFGL & 0x01FFu },
     /* pins */
@@ -91,6 +93,9 @@ static void test_registers(void)
 {
     static uint16_t untested;
     uint16_t left, wrong = PSVPAG; /* 8 bits in the device header */
+#if HEAT_USED
+    wrong |= (uint16_t)(AD1CHS0 ^ board_ch0); /* each time: the next sample is its */
+#endif
     for (left = REGISTERS_AT_ONCE; left != 0u; left--) {
         const written_t *w;
         if (untested == 0u) {
@@ -222,16 +227,16 @@ static void start_adc(void)
     if (board_drive.state == (uint16_t)DRIVE_STOPPED && !board_drive.command.run) {
         adc_since = board_drive.ticks;
         adc_pot_q15 = board_pot.now_q15;
-        AD1CHS0 = BOARD_AN_OFF;
+        firmware_choose_input(BOARD_AN_OFF);
     }
 }
 
 /** The second sample after the change is AVSS for sure; the panel gets the potentiometer's sample from before. */
 static void end_adc(void)
 {
-    int16_t zero_q15 = board_pot.now_q15;
+    int16_t zero_q15 = HEAT_USED ? (int16_t)ADC1BUF0 : board_pot.now_q15;
     if (AD1CHS0 == BOARD_AN_OFF && (uint16_t)(board_drive.ticks - adc_since) >= 3u) {
-        AD1CHS0 = BOARD_AD1CHS0;
+        firmware_choose_input(BOARD_AD1CHS0);
         board_pot.now_q15 = adc_pot_q15;
         if (zero_q15 > ADC_ZERO_MOST) {
             selftest_fail(SELFTEST_ADC);

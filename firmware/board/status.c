@@ -25,8 +25,19 @@ static char sent_line[MODE_LINE_SIZE] LINE_PLACE BOARD_UNSET;
 static uint16_t line_next BOARD_UNSET; /* index of the next character; a zero byte ends the line */
 static uint16_t waited_ms BOARD_UNSET;
 
-#define LIMIT_NAME(bit, name, cause, remedy) " " #name "\0" /* one after the other: a pointer to each would take as much as half of them */
-#define LONGEST_LIMIT " FIELD_WEAKENING"                    /* a test holds the others to it */
+/* What this build cannot tell has its place without its text: NAMED(X, yes) is yes, unless UNTOLD_X is defined. */
+#if !HEAT_USED
+#define UNTOLD_TEMPERATURE , " \0"
+#define UNTOLD_MOTOR_HOT , "\0"
+#define UNTOLD_BRIDGE_HOT , "\0"
+#define UNTOLD_NTC_SENSOR , "\0"
+#endif
+#define NAMED(name, text) NAMED_SECOND(UNTOLD_##name, text, )
+#define NAMED_SECOND(...) NAMED_SECOND_(__VA_ARGS__)
+#define NAMED_SECOND_(first, second, ...) second
+
+#define LIMIT_NAME(bit, name, cause, remedy) NAMED(name, " " #name "\0") /* one after the other: a pointer to each would take as much as half of them */
+#define LONGEST_LIMIT " FIELD_WEAKENING"                                 /* a test holds the others to it */
 /* From here on the line has no room for it, a self-test and the end. */
 #define LIMITS_END (sizeof sent_line - sizeof LONGEST_LIMIT - sizeof " selftest 10\r\n")
 
@@ -60,6 +71,19 @@ static char *put_retry(char *at)
     return text_put_fault(text_put_unsigned(text_put(at, " retries "), board_retry.left), " first ", board_retry.first);
 }
 
+/** What the sensors show: " motor 61 C bridge 40 C". @return the text's end */
+static char *put_heat(char *at)
+{
+    char *end = at;
+#if MOTOR_NTC_USED
+    end = text_put(text_put_named(end, " motor ", (int16_t)(board_drive.heat.motor.celsius_q4 / 16)), " C");
+#endif
+#if BRIDGE_NTC_USED
+    end = text_put(text_put_named(end, " bridge ", (int16_t)(board_drive.heat.bridge.celsius_q4 / 16)), " C");
+#endif
+    return end;
+}
+
 int16_t status_rpm(speed_erpm_t speed)
 {
     uint32_t erpm = qm_muluu((uint16_t)qm_abs(speed), SPEED_UNIT), most = (uint32_t)INT16_MAX * NOPOLESPAIRS;
@@ -77,7 +101,7 @@ static char *put_line(void)
         at = text_put_named(at, "state ", (int16_t)board_drive.state);
         at = text_put_fault(at, " fault ", board_drive.fault);
         at = text_put_named(at, " speed ", status_rpm(estimator_speed(&board_drive.run.estimator)));
-        at = put_limits(put_retry(text_put(at, " rpm")));
+        at = put_limits(put_retry(put_heat(text_put(at, " rpm"))));
         at = text_end(selftest_put(at));
     }
     return at;
@@ -174,7 +198,7 @@ void status_send(void)
 
 /* ---- Text and decimal numbers into a buffer ---- */
 
-#define FAULT_NAME(code, name, passes, decided_by, cause, remedy) #name "\0"
+#define FAULT_NAME(code, name, passes, decided_by, cause, remedy) NAMED(name, #name "\0")
 
 char *text_put(char *at, const char *text)
 {

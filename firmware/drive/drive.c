@@ -39,6 +39,7 @@ void drive_init(drive_t *d, const drive_params_t *p)
     SELFTEST_KEEP(d, offset_a, 0);
     SELFTEST_KEEP(d, offset_b, 0);
     d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
+    heat_init(d, p);
     bus_update_gain(d, p, p->bus_nominal_q15);
     bus_update_voltage_limit(d, p);
     drive_update_model(&d->run, p, p->end_erpm);

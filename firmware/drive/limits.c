@@ -101,7 +101,7 @@ current_q13_t limits_derated(const drive_params_t *p, int16_t bus_q15)
 /** 1 where a limit of the driving current is in use. */
 static uint16_t limits_drive_less(const drive_params_t *p)
 {
-    return (uint16_t)(p->supply_limit_q13 != 0 || p->derate_per_bus_q8 != 0);
+    return (uint16_t)(HEAT_USED || p->supply_limit_q13 != 0 || p->derate_per_bus_q8 != 0);
 }
 
 /** Narrows the q current's limit for a reason. */
@@ -129,6 +129,9 @@ void limits_driving(drive_t *d, const drive_params_t *p)
     }
     if (p->derate_per_bus_q8 != 0 && drives) {
         limits_narrow(c, limits_derated(p, qm_hi(d->bus_q31)), LIMIT_LOW_BUS);
+    }
+    if (HEAT_USED && drives) {
+        limits_narrow(c, heat_most(d), LIMIT_TEMPERATURE);
     }
 }
 

@@ -143,7 +143,7 @@ static void retry_pause(retry_t *r, drive_t *d, uint16_t elapsed_ms)
         r->waited_ms = 0;
     }
     r->asked = 0;
-    if (r->left != 0u && retry_may_pass(d->fault) && time_is_over(r, elapsed_ms, RETRY_MS(RETRY_PAUSE_SEC))) {
+    if (r->left != 0u && retry_may_pass(d->fault) && !heat_holds(d) && time_is_over(r, elapsed_ms, RETRY_MS(RETRY_PAUSE_SEC))) {
         r->left--;
         r->asked = 1;
         d->command.clear_fault = 1;

@@ -30,6 +30,9 @@
 /** Counts of a share, 0..1: of the potentiometer's travel. */
 #define APP_SHARE(share) ((uint16_t)(PARAM_F(share) * 65535.0F))
 
+/** Counts of a temperature, -40..152 degrees Celsius. */
+#define APP_CELSIUS(celsius) ((int16_t)(16.0F * PARAM_F(celsius)))
+
 /** The same of a speed that is no constant. @param rpm int16_t; times NOPOLESPAIRS within a word */
 #define APP_OF_RPM(rpm) ((int16_t)((int16_t)((rpm) * (int16_t)NOPOLESPAIRS) / (int16_t)SPEED_UNIT))
 
@@ -79,8 +82,14 @@ typedef struct {
     uint16_t pot_q16;            /**< potentiometer's share of its travel, smoothed from 0 at power-up, APP_SHARE(); in BIDIRECTIONAL_SPEED from its middle */
     int16_t towards;             /**< 1 or -1: the direction of the potentiometer's side in BIDIRECTIONAL_SPEED, else 1; APP_DIRECTION turns it round */
     uint16_t pot_is_lost;        /**< 1: its signal is where no position is, POT_LIVE_ZERO */
-    app_range_t slow;            /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
-    app_range_t fast;            /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */
+#if MOTOR_NTC_USED
+    int16_t motor_q4; /**< temperature of the motor's NTC, counts of APP_CELSIUS(); 0 until it is known */
+#endif
+#if BRIDGE_NTC_USED
+    int16_t bridge_q4; /**< temperature of the bridge's NTC, counts of APP_CELSIUS(); 0 until it is known */
+#endif
+    app_range_t slow; /**< MINIMUM_SPEED_RPM .. NOMINAL_SPEED_RPM; TORQUE_MODE: currents */
+    app_range_t fast; /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */
 #if APP_SERIAL
     char *heard; /**< a line that has come, without its end; 0 without. Only for this call */
 #endif

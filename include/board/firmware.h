@@ -40,6 +40,16 @@ void firmware_init(void) FIRMWARE_CALLED;
 /** Outputs off and the fault raised, from anywhere but the control interrupt. */
 void firmware_trip(drive_fault_t fault) FIRMWARE_CALLED;
 
+#if HEAT_USED
+/** AD1CHS0 as it was written last. */
+extern uint16_t board_ch0;
+
+/** Chooses CH0's input. Background. @param input an AN number, or BOARD_AN_OFF */
+void firmware_choose_input(uint16_t input);
+#else
+#define firmware_choose_input(input) (AD1CHS0 = (input))
+#endif
+
 /** One pass of the loop. */
 void firmware_background(void) FIRMWARE_CALLED;
 

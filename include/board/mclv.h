@@ -16,6 +16,8 @@
 #define BOARD_PIN_CURRENT_B A, 1 /* current of phase B; AN1292 and published code */
 #define BOARD_PIN_BUS B, 0       /* bus voltage / 16; published code, the divider is known for the MCLV-2 only [?] */
 #define BOARD_PIN_POT C, 2       /* potentiometer; published code */
+#define BOARD_PIN_MOTOR_NTC C, 0  /* NTC of the motor, to ground, with a resistor to 3.3 V; MOTOR_NTC_USED; [?] a spare input, follow it on the board */
+#define BOARD_PIN_BRIDGE_NTC C, 1 /* NTC of the bridge, the same; BRIDGE_NTC_USED; [?] a spare input, follow it on the board */
 #define BOARD_PIN_S2 A, 8        /* S2, low when pressed; published code */
 #define BOARD_PIN_S3 B, 4        /* S3, low when pressed; published code */
 #define BOARD_PIN_FAULT B, 8     /* FLTA1, the over-current comparator, low on a fault; published code */
@@ -43,6 +45,7 @@ PIN_NEEDS(currents_and_bus_are_AN0_to_2_or_AN3_to_5,
           (PIN_AN(BOARD_PIN_CURRENT_A) == 0 || PIN_AN(BOARD_PIN_CURRENT_A) == 3) && PIN_AN(BOARD_PIN_CURRENT_B) == PIN_AN(BOARD_PIN_CURRENT_A) + 1
               && PIN_AN(BOARD_PIN_BUS) == PIN_AN(BOARD_PIN_CURRENT_A) + 2);
 PIN_NEEDS(potentiometer_has_an_AN_number, PIN_AN(BOARD_PIN_POT) >= 0);
+PIN_NEEDS(temperatures_have_AN_numbers, PIN_AN(BOARD_PIN_MOTOR_NTC) >= 0 && PIN_AN(BOARD_PIN_BRIDGE_NTC) >= 0);
 PIN_NEEDS(fault_input_has_an_RP_number, PIN_RP(BOARD_PIN_FAULT) >= 0);
 PIN_NEEDS(direction_input_has_a_pull_up, !(DIRECTION_INPUT_USED) || PIN_CN(BOARD_PIN_DIRECTION) >= 0);
 PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(BOARD_PIN_UART_RX) >= 0);
@@ -93,7 +96,18 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 #define BOARD_AD1CHS0 ((uint16_t)PIN_AN(BOARD_PIN_POT))                          /* CH0 */
 #define BOARD_AD1CHS123 ((uint16_t)((PIN_AN(BOARD_PIN_CURRENT_A) == 0) ? 0 : 1)) /* CH1: I_A, CH2: I_B, CH3: bus */
 #define BOARD_AD1PCFGL ((uint16_t) ~(PIN_AN_MASK(BOARD_PIN_CURRENT_A) | PIN_AN_MASK(BOARD_PIN_CURRENT_B) | PIN_AN_MASK(BOARD_PIN_BUS) \
-                                     | PIN_AN_MASK(BOARD_PIN_POT))) /* 0 is analogue */
+                                     | PIN_AN_MASK(BOARD_PIN_POT) | BOARD_NTC_MASK)) /* 0 is analogue */
+#define BOARD_NTC_MASK (((MOTOR_NTC_USED) ? PIN_AN_MASK(BOARD_PIN_MOTOR_NTC) : 0u) | ((BRIDGE_NTC_USED) ? PIN_AN_MASK(BOARD_PIN_BRIDGE_NTC) : 0u))
+/* CH0 of the motor's sensor and of the bridge's, between two of the potentiometer's; one without a sensor is the other's turn. */
+#define BOARD_CH0_MOTOR ((uint16_t)((MOTOR_NTC_USED) ? PIN_AN(BOARD_PIN_MOTOR_NTC) : PIN_AN(BOARD_PIN_BRIDGE_NTC)))
+#define BOARD_CH0_BRIDGE ((uint16_t)((BRIDGE_NTC_USED) ? PIN_AN(BOARD_PIN_BRIDGE_NTC) : PIN_AN(BOARD_PIN_MOTOR_NTC)))
+
+/** An analogue input that AD1PCFGL switches off: the multiplexer gives AVSS. */
+#define BOARD_AN_IS_OFF(an) ((BOARD_AD1PCFGL & (1u << (an))) != 0u)
+#define BOARD_AN_OFF ((uint16_t)(BOARD_AN_IS_OFF(6) ? 6 : BOARD_AN_IS_OFF(7) ? 7 \
+                                                      : BOARD_AN_IS_OFF(5)   ? 5 \
+                                                      : BOARD_AN_IS_OFF(1)   ? 1 \
+                                                                             : 2))
 
 /* ---- Buttons, active low ---- */
 #define BOARD_S2_DOWN() PIN_LOW(BOARD_PIN_S2) /* start, stop, clear a fault */

@@ -9,9 +9,6 @@
 #define STACK_GUARD (BOARD_STACK_LIMIT - 2)
 #define STACK_PATTERN 0xA5C3u
 
-/** An analogue input that AD1PCFGL switches off: the multiplexer gives AVSS. */
-#define BOARD_AN_OFF ((uint16_t)((BOARD_AD1PCFGL & 0x0040u) ? 6 : 7))
-
 #ifdef __XC16__
 #define BOARD_RAM ((volatile uint16_t *)0x0800)
 #define BOARD_RAM_END ((volatile uint16_t *)0x1000)

@@ -8,6 +8,7 @@
 #include "control/svm.h"
 #include "drive/catch.h"
 #include "drive/handover.h"
+#include "drive/heat.h"
 #include "drive/held.h"
 #include "drive/model.h"
 #include "drive/modes/modes.h"
@@ -79,6 +80,7 @@ struct drive_params {
     q15_t ls_off;              /**< how far L may be off, to either side */
     int16_t dead_emf_q12;      /**< what dead time may put into the back-EMF */
     speed_erpm_t overspeed_erpm;
+    HEAT_PARAMS
     SALIENT_PARAMS
     PROFILE_PARAMS
 };
@@ -160,6 +162,7 @@ struct drive {
     angle_t angle;             /**< control angle of the next sample */
     sincos_t frame;            /**< its sine and cosine */
     drive_run_t run;
+    HEAT_STATE
     SELFTEST_STATE
 };
 

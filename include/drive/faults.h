@@ -74,7 +74,16 @@
       "see board_selftest_failed or the status line for the test, docs/selftest.md for its meaning, then reset: S2 does not clear this one") \
     X(21, APPLICATION, FAULT_STAYS, "panel_tick, application_watch, application_fault", \
       "the application did not return within 20 ms, or found a fault of its own", \
-      "look in firmware/app, or in the file of APP=, for a loop that waits and for what sets asks->fault")
+      "look in firmware/app, or in the file of APP=, for a loop that waits and for what sets asks->fault") \
+    X(22, MOTOR_HOT, FAULT_PASSES, "heat_follow", \
+      "the motor's NTC has read MOTOR_TRIP_C, and less than 10 K below it since", \
+      "let the motor cool down: until then nothing clears this one; lower the load or MAXIMUM_CURRENT_A; check MOTOR_NTC_OHM and MOTOR_NTC_BETA_K") \
+    X(23, BRIDGE_HOT, FAULT_PASSES, "heat_follow", \
+      "the bridge's NTC has read BRIDGE_TRIP_C, and less than 10 K below it since", \
+      "let the bridge cool down: until then nothing clears this one; cool it better, or lower the load; check BRIDGE_NTC_OHM and BRIDGE_NTC_BETA_K") \
+    X(24, NTC_SENSOR, FAULT_STAYS, "ntc_judge", \
+      "an NTC's input has read an end of its range for a tenth of a second: a broken wire or a short circuit", \
+      "check the wires, and that the sensor is the one of MOTOR_NTC_USED or BRIDGE_NTC_USED; until then nothing clears this one")
 
 #define DRIVE_FAULT_ENUM(code, name, passes, decided_by, cause, remedy) FAULT_##name = (code),
 /** Fault codes. */

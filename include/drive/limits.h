@@ -7,7 +7,7 @@
 /** X(bit, name, cause, remedy). Several may hold at once, so each is a bit, which never changes its meaning. */
 #define DRIVE_LIMIT_TABLE(X) \
     DRIVE_LIMIT_TABLE_BARE(X) \
-    X(4096, CHOPPER, "the brake resistor has had BRAKE_CHOPPER_SHARE of the time and rests", \
+    X(8192, CHOPPER, "the brake resistor has had BRAKE_CHOPPER_SHARE of the time and rests", \
       "slow down more gently or less often; raise BRAKE_CHOPPER_SHARE if the resistor bears more")
 
 /** Those of a drive without a brake resistor. */
@@ -35,7 +35,9 @@
     X(1024, SUPPLY, "the q current is at what SUPPLY_CURRENT_LIMIT_A allows", \
       "take load or speed off; raise SUPPLY_CURRENT_LIMIT_A if the supply gives more") \
     X(2048, LOW_BUS, "the bus is below DERATE_BELOW_V and the q current at what that leaves", \
-      "check the supply and its cable, or charge the battery; take load off")
+      "check the supply and its cable, or charge the battery; take load off") \
+    X(4096, TEMPERATURE, "the motor is above MOTOR_DERATE_C or the bridge above BRIDGE_DERATE_C, and the q current at what that leaves", \
+      "take load off, or cool it better; at MOTOR_TRIP_C or BRIDGE_TRIP_C the drive trips")
 
 #define DRIVE_LIMIT_ENUM(bit, name, cause, remedy) LIMIT_##name = (bit),
 

@@ -37,8 +37,10 @@
         .pot_scale_q15 = (uint16_t)(32768.0F / (1.0F - 2.0F * PARAM_F(POT_LIVE_ZERO)) + 0.5F), \
         PARAM_START_INIT, \
         PARAM_PROTECTION_INIT, \
-        PARAM_PROFILE_INIT \
-            PARAM_SALIENT_INIT \
+        PARAM_MOTOR_NTC_INIT \
+            PARAM_BRIDGE_NTC_INIT \
+                PARAM_PROFILE_INIT \
+                    PARAM_SALIENT_INIT \
     }
 
 #endif

@@ -9,7 +9,7 @@
  *  the spreadsheet and docs/parameters.md are made from the same rows. The default of a value that follows from something else says
  *  from what: FROM_MOTOR and FROM_BOARD (files in tuning/), FROM_TUNER. Tools read the rows as text: keep a row on a line. */
 #define PARAM_TABLE(X) PARAM_MOTOR(X) PARAM_BOARD(X) PARAM_SPEEDS(X) PARAM_START(X) PARAM_LIMITS(X) PARAM_LOOPS(X) PARAM_FILTERS(X) \
-    PARAM_FIELD_WEAKENING(X) PARAM_STOP(X) PARAM_SIGNALS(X) PARAM_CHOPPER(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_SCOPE(X) PARAM_RETRY(X)
+    PARAM_FIELD_WEAKENING(X) PARAM_STOP(X) PARAM_SIGNALS(X) PARAM_CHOPPER(X) PARAM_SNAPSHOT(X) PARAM_RECORDER(X) PARAM_SCOPE(X) PARAM_RETRY(X) PARAM_HEAT(X)
 
 #define PARAM_MOTOR(X) /* Motor, values per phase of the star */ \
     X(NOPOLESPAIRS, "pairs", 1, 50, FROM_MOTOR, "pole pairs") \
@@ -101,6 +101,20 @@
     X(RETRY_COUNT, "times", 0, 20, 0, "retries before a fault stays; 0: never, appliances usually have 3") \
     X(RETRY_PAUSE_SEC, "s", 0.5, 600, 2, "outputs off before each retry; S2 ends it") \
     X(RETRY_FORGET_SEC, "s", 1, 3600, 10, "in closed loop without a fault gives the retries back")
+
+#define PARAM_HEAT(X) /* Temperatures: an NTC thermistor from its input to ground, a resistor from there to 3.3 V */ \
+    X(MOTOR_NTC_USED, "switch", 0, 1, 0, "1: there is one in the motor; 0: none, and the rows about it mean nothing") \
+    X(MOTOR_NTC_OHM, "ohm", 100, 1000000, 10000, "its resistance at 25 degrees Celsius") \
+    X(MOTOR_NTC_BETA_K, "K", 2000, 5000, 3435, "its B: R = MOTOR_NTC_OHM exp(B (1/T - 1/298.15 K))") \
+    X(MOTOR_NTC_DIVIDER_OHM, "ohm", 100, 1000000, 10000, "the resistor to 3.3 V") \
+    X(MOTOR_DERATE_C, "C", 0, 145, 110, "motor warmer than this has its driving current reduced, to a fifth of MAXIMUM_CURRENT_A at MOTOR_TRIP_C") \
+    X(MOTOR_TRIP_C, "C", 20, 150, 130, "motor that warm trips, and stays off until it is 10 K cooler") \
+    X(BRIDGE_NTC_USED, "switch", 0, 1, 0, "1: there is one at the bridge; 0: none, and the rows about it mean nothing") \
+    X(BRIDGE_NTC_OHM, "ohm", 100, 1000000, 10000, "its resistance at 25 degrees Celsius") \
+    X(BRIDGE_NTC_BETA_K, "K", 2000, 5000, 3435, "its B") \
+    X(BRIDGE_NTC_DIVIDER_OHM, "ohm", 100, 1000000, 10000, "the resistor to 3.3 V") \
+    X(BRIDGE_DERATE_C, "C", 0, 145, 80, "bridge warmer than this has the driving current reduced, to a fifth of MAXIMUM_CURRENT_A at BRIDGE_TRIP_C") \
+    X(BRIDGE_TRIP_C, "C", 20, 150, 100, "bridge that warm trips, and stays off until it is 10 K cooler")
 
 /** The 18 parameters of a table: stem0 .. stem17. */
 #define PARAM_ENTRIES(X, stem, ...) \
@@ -205,7 +219,16 @@
     X(PARAM_F(BRAKE_CHOPPER_V) <= 0.0F || PARAM_F(REGEN_LIMIT_V) >= 1.02F * PARAM_F(BRAKE_CHOPPER_V), \
       PARAM_NAMED(REGEN_LIMIT_V) " must be at least 1.02 * " PARAM_NAMED(BRAKE_CHOPPER_V) ": the brake resistor comes first, braking is reduced above it")
 
+#define PARAM_RELATION_HEAT(X, stem) \
+    X(!(stem##_NTC_USED) || PARAM_F(stem##_DERATE_C) + 5.0F <= PARAM_F(stem##_TRIP_C), \
+      PARAM_NAMED(stem##_DERATE_C) " must be at least 5 below " PARAM_NAMED(stem##_TRIP_C)) \
+    X(!(stem##_NTC_USED) || PARAM_NTC_SHARE(stem, NTC_LEAST_C) <= 0.985F, \
+      PARAM_NAMED(stem##_NTC_DIVIDER_OHM) " must be at least 1/65 of the NTC's resistance at -40 degrees Celsius: cold is not to be told from a broken wire") \
+    X(!(stem##_NTC_USED) || PARAM_NTC_SHARE(stem, NTC_MOST_C) >= 0.0115F, \
+      PARAM_NAMED(stem##_NTC_DIVIDER_OHM) " must be at most 85 times the NTC's resistance at 152 degrees Celsius: hot is not to be told from a short circuit")
+
 #define PARAM_RELATION_REST(X) \
+    PARAM_RELATION_HEAT(X, MOTOR) PARAM_RELATION_HEAT(X, BRIDGE) \
     X(!DEFER_DUTIES || (SCOPE) == 0, \
       PARAM_NAMED(LOOPTIME_SEC) " must be at least 0.00004 with SCOPE, for which a shorter period has no time: leave SCOPE 0, or use a longer period") \
     X(PARAM_TOP_ERPM <= PARAM_F(PARAM_LARGEST_ERPM), \

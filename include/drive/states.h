@@ -86,7 +86,8 @@ typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_sta
 #define TRANSITIONS_BY_SUPERVISION(X) \
     X(FAULT, "OVERCURRENT_HW, TRAP, CLOCK: the fault input or a trap") \
     X(FAULT, "ISR_OVERRUN, ADC_LOST, INTERRUPT_RATE, WATCHDOG, SELFTEST: the program does not run as it must") \
-    X(FAULT, "POTENTIOMETER, APPLICATION; OVERVOLTAGE: the bus reads the end of its range")
+    X(FAULT, "POTENTIOMETER, APPLICATION; OVERVOLTAGE: the bus reads the end of its range") \
+    X(FAULT, "MOTOR_HOT, BRIDGE_HOT, NTC_SENSOR: a temperature, or its sensor")
 /* While the bridge conducts. */
 #define TRANSITIONS_BY_CURRENT_OR_BUS(X) X(FAULT, "OVERCURRENT_SW, OVERVOLTAGE, UNDERVOLTAGE, OVERTEMPERATURE: current, bus or heat outside the limits")
 /* While the estimator's angle is in command. */

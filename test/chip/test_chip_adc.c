@@ -250,3 +250,44 @@ void test_an_input_that_is_switched_off_reads_ground_and_is_a_warning_after_a_wh
     TEST_ASSERT_TRUE(warned_about("AD1CHS0"));
     TEST_ASSERT_TRUE(warned_about("AD1PCFGL"));
 }
+
+/* The thermistors are CH0's in turn with the potentiometer. */
+void test_thermistors_give_the_share_of_their_temperature_and_are_no_mistake_where_they_are_analogue(void)
+{
+    at_init("AD1PCFGL", 0xFE38);
+    set("adc.noise_lsb", 0.0);
+    set("motor.temp_c", 25.0);
+    set("ntc.bridge_c", 70.0); /* 2.204 kohm of 10 */
+    start(10);
+    AD1CHS0 = 6;
+    run(10);
+    TEST_ASSERT_EQUAL_HEX16(0x0000, buffer[0]);
+    AD1CHS0 = 7;
+    run(10);
+    TEST_ASSERT_UINT16_WITHIN(64, 0x8000u + (unsigned)(65536.0 * 2.204 / 12.204), buffer[0]);
+    set("fault.bridge_ntc_stuck", 3.0);
+    run(3);
+    TEST_ASSERT_EQUAL_HEX16(0x7FC0, buffer[0]);
+    set("fault.motor_ntc_stuck", 2.0);
+    AD1CHS0 = 6;
+    run(10);
+    TEST_ASSERT_EQUAL_HEX16(0x8000, buffer[0]);
+    TEST_ASSERT_FALSE(warned_about("AD1CHS0"));
+    TEST_ASSERT_FALSE(warned_about("AD1PCFGL"));
+    AD1CHS0 = 5;
+    run(10);
+    TEST_ASSERT_TRUE(warned_about("AD1CHS0"));
+}
+
+void test_the_motor_s_thermistor_follows_the_winding_with_its_lag(void)
+{
+    set("ntc.motor_lag_s", 0.01);
+    set("motor.temp_c", 25.0);
+    start(10);
+    set("motor.temp_c", 125.0);
+    run(200);
+    TEST_ASSERT_DOUBLE_WITHIN(0.5, 125.0 - 100.0 * exp(-1.0), get("ntc.motor_c"));
+    set("ntc.motor_lag_s", 0.0);
+    run(1);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 125.0, get("ntc.motor_c"));
+}

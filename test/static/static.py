@@ -95,9 +95,9 @@ def relative(path: str) -> str:
 
 
 def configurations() -> list[tuple[str, ...]]:
-    """Macros of each build that is looked at: as delivered, each mode alone, with the scope, some modes together."""
+    """Macros of each build that is looked at: as delivered, each mode alone, with the scope, with both temperatures, some modes together."""
     modes = re.findall(r"^ *X\((\w+), ", MODE_TABLE.read_text(encoding="utf-8"), re.M)
-    return [(), *((mode,) for mode in modes), ("SCOPE",), ("APP_SERIAL",), *COMBINED]
+    return [(), *((mode,) for mode in modes), ("SCOPE",), ("APP_SERIAL",), ("MOTOR_NTC_USED", "BRIDGE_NTC_USED"), *COMBINED]
 
 
 def defines(configuration: tuple[str, ...]) -> list[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tools.common import drive_tables
 from tools.common.paths import ROOT
 
 TREES = ("firmware", "include", "tools", "tuning", "docs", "test/unit")
@@ -62,21 +63,23 @@ class Tree:
 
 
 def add_fault(tree: Tree) -> None:
-    tree.row("include/drive/faults.h", "DRIVE_FAULT_TABLE", 'X(22, BELT, FAULT_STAYS, "protection_check_rotor", "the belt slips", "tighten the belt")')
+    code = len(drive_tables.faults())
+    tree.row("include/drive/faults.h", "DRIVE_FAULT_TABLE", f'X({code}, BELT, FAULT_STAYS, "protection_check_rotor", "the belt slips", "tighten the belt")')
     tree.at_end("firmware/drive/protection.c", "protection_check_rotor", "if (d->ticks == 7u) {\n        drive_raise(d, FAULT_BELT);\n    }")
     tree.row("include/drive/states.h", "TRANSITIONS_BY_ROTOR_OR_SIGNAL", 'X(FAULT, "BELT: it slips")')
     stall = (ROOT / "tools/bench/scenarios/fault_stall.toml").read_text(encoding="utf-8")
     tree.put("tools/bench/scenarios/fault_NAME.toml", stall.replace("START_FAILED", "BELT"))
-    tree.compile("FAULT_BELT == 22 && FAULT_COUNT == 23")
-    assert "| 22 | BELT |  | the belt slips | tighten the belt | [`protection_check_rotor`](../firmware/drive/protection.c) |" in tree.page("faults")
+    tree.compile(f"FAULT_BELT == {code} && FAULT_COUNT == {code + 1}")
+    assert f"| {code} | BELT |  | the belt slips | tighten the belt | [`protection_check_rotor`](../firmware/drive/protection.c) |" in tree.page("faults")
     tree.passes("test/unit/test_fault_page.py")
 
 
 def add_limit(tree: Tree) -> None:
-    tree.row("include/drive/limits.h", "DRIVE_LIMIT_TABLE", 'X(8192, BELT, "the belt slips", "tighten the belt")')
+    bit = 1 << len(drive_tables.limits())
+    tree.row("include/drive/limits.h", "DRIVE_LIMIT_TABLE", f'X({bit}, BELT, "the belt slips", "tighten the belt")')
     tree.at_end("firmware/drive/limits.c", "limits_reasons", "found |= (d->ticks == 7u) ? (uint16_t)LIMIT_BELT : 0u;")
-    tree.compile("LIMIT_BELT == 8192")
-    assert "| 8192 | BELT | the belt slips | tighten the belt |" in tree.page("limits")
+    tree.compile(f"LIMIT_BELT == {bit}")
+    assert f"| {bit} | BELT | the belt slips | tighten the belt |" in tree.page("limits")
     tree.passes("test/unit/test_fault_page.py")
 
 

@@ -151,6 +151,12 @@ RELATIONS = {
     "DERATE_BELOW_V must be 0, for no derating, or at least UNDER_VOLTAGE_V + 1 V": [
         case("DERATE_BELOW_V", "12.9", "13"), case("DERATE_BELOW_V", "0.1", "0"), case("UNDER_VOLTAGE_V", "18.1", "18", DERATE_BELOW_V="19")],
     "DERATE_BELOW_V must be at most NOMINAL_BUS_V": [case("DERATE_BELOW_V", "24.1", "24")],
+    **{f"{sensor}_DERATE_C must be at least 5 below {sensor}_TRIP_C": [case(f"{sensor}_TRIP_C", "94.9", "95", **{f"{sensor}_NTC_USED": "1", f"{sensor}_DERATE_C": "90"})]
+       for sensor in ("MOTOR", "BRIDGE")},
+    **{f"{sensor}_NTC_DIVIDER_OHM must be at least 1/65 of the NTC's resistance at -40": [
+        case(f"{sensor}_NTC_DIVIDER_OHM", "3770", "3790", **{f"{sensor}_NTC_USED": "1"})] for sensor in ("MOTOR", "BRIDGE")},
+    **{f"{sensor}_NTC_DIVIDER_OHM must be at most 85 times the NTC's resistance at 152": [
+        case(f"{sensor}_NTC_DIVIDER_OHM", "27600", "27450", **{f"{sensor}_NTC_USED": "1"})] for sensor in ("MOTOR", "BRIDGE")},
     "REGEN_LIMIT_V must be above NOMINAL_BUS_V": [case("REGEN_LIMIT_V", "24.0", "24.1")],
     "REGEN_LIMIT_V + 2 V must be at most OVER_VOLTAGE_V": [case("REGEN_LIMIT_V", "32.1", "31.9")],
     "BRAKE_CHOPPER_V must be 0, for no brake resistor, or at least 1.05 * NOMINAL_BUS_V": [

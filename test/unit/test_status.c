@@ -100,6 +100,9 @@ void test_each_reason_is_told_by_its_name_and_what_finds_no_room_is_told_in_the_
     uint16_t lines = 0;
     for (uint16_t n = 0; n < sizeof names / sizeof names[0]; n++) {
         char text[64] = "state 0 fault NONE speed 0 rpm limit ";
+        if (names[n].bit == LIMIT_TEMPERATURE) { /* not in this build: test_heat_board.c */
+            continue;
+        }
         LimitParm.seen = names[n].bit;
         sent_count = 0;
         status_tick(500);

@@ -73,7 +73,7 @@ class Job:
 def prepare(variant: Variant, library: Library, motor: board_keys.Part, board: board_keys.Part) -> Job:
     """Checks the variant's keys. Nothing runs yet."""
     layers = [motor.values, board.values, variant.keys]
-    values = {"input.pot": 0.5, "input.pot_live_zero": library.params.get("POT_LIVE_ZERO", 0.0)} | board_keys.resolve(layers, library.keys)
+    values = {"input.pot": 0.5, **board_keys.of_header(library.params)} | board_keys.resolve(layers, library.keys)
     values.setdefault("state.theta_e_deg", 137.0)
     return Job(variant, library.path, values, param(library.params, "MAXIMUM_CURRENT_A"))
 

@@ -60,7 +60,7 @@ def prepare(scenario: Scenario, library: Library, motor: board_keys.Part, board:
     rating = rating_of(motor, board) if scenarios.asks_for_rating(scenario) else None
     scenario = scenarios.in_numbers(scenario, rating, params)
     layers = [motor.values, board.values, scenario.plant] + ([extra] if extra else [])
-    values = {"input.pot_live_zero": params.get("POT_LIVE_ZERO", 0.0)} | board_keys.resolve(layers, keys)
+    values = board_keys.of_header(params) | board_keys.resolve(layers, keys)
     for event in scenario.events:
         for key, value in event.keys.items():
             board_keys.check(key, value, keys, event.where)

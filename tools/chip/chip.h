@@ -69,7 +69,8 @@ typedef struct {
  *   send       a character has left UART1
  *   receive    the next character for UART1, or -1
  *   warn       the firmware uses a peripheral in a way that cannot work; the text starts with the register's name
- *   fault_rp   the RPn pin with the fault signal; channel: the input that sample-and-hold 0..3 should take, and its name */
+ *   fault_rp   the RPn pin with the fault signal; channel: the input that sample-and-hold 0..3 should take, its name, and a mask of others that it may
+ *              take in turn */
 typedef struct {
     void *context;
     void (*levels)(void *context, uint16_t level[3]);
@@ -80,7 +81,7 @@ typedef struct {
     int (*receive)(void *context);
     void (*warn)(void *context, const char *format, va_list args);
     unsigned fault_rp;
-    struct { unsigned input; const char *name; } channel[4];
+    struct { unsigned input; const char *name; uint16_t others; } channel[4];
 } chip_board_t;
 
 typedef struct chip chip_t;

@@ -94,7 +94,8 @@ static void warn_inputs(chip_t *chip)
     static const uint16_t tris[3] = {SFR_TRISA, SFR_TRISB, SFR_TRISC};
     for (unsigned c = 0; c < chip->adc.channels; c++) {
         unsigned input = selected_input(chip, c);
-        if (chip->board.channel[c].name != NULL && input != chip->board.channel[c].input) {
+        bool in_turn = ((chip->board.channel[c].others & ~(unsigned)CHIP_REG(chip, AD1PCFGL)) >> input & 1u) != 0;
+        if (chip->board.channel[c].name != NULL && input != chip->board.channel[c].input && !in_turn) {
             chip_warn(chip, "%s: CH%u samples AN%u, %s is on AN%u", c == 0 ? "AD1CHS0" : "AD1CHS123", c, input, chip->board.channel[c].name,
                       chip->board.channel[c].input);
         }

@@ -72,6 +72,16 @@ def check(key: str, value: float, keys: Mapping[str, Key], where: str) -> None:
         raise UserError(f"'{key}' = {value:g} is impossible", where, f"choose {info.minimum:g} .. {info.maximum:g}{unit}")
 
 
+OF_HEADER = {"input.pot_live_zero": "POT_LIVE_ZERO", **{f"ntc.{sensor}_{part}": f"{sensor}_NTC_{part}".upper()
+                                                      for sensor in ("motor", "bridge") for part in ("ohm", "beta_k", "divider_ohm")}}
+"""Keys of the board that are as the header says, unless a file says otherwise."""
+
+
+def of_header(params: Mapping[str, float]) -> dict[str, float]:
+    """Their values."""
+    return {key: params[name] for key, name in OF_HEADER.items() if name in params}
+
+
 def resolve(layers: list[Values], keys: Mapping[str, Key]) -> dict[str, float]:
     """Final value of every key: later layers replace or scale earlier ones; what none names keeps the board's default."""
     result: dict[str, float] = {}

@@ -166,3 +166,12 @@ iss_commands_t iss_probe_commands(void)
     return (iss_commands_t){d->command.run, d->command.clear_fault, d->command.target_erpm, d->direction, d->state, d->fault, d->ticks,
                             (uint16_t)target_word(places.snap_start)};
 }
+
+void iss_probe_heat(void *heat)
+{
+#if HEAT_USED
+    memcpy(heat, &refreshed_drive()->heat, sizeof refreshed_drive()->heat);
+#else
+    (void)heat;
+#endif
+}

@@ -43,4 +43,7 @@ typedef struct {
 
 iss_commands_t iss_probe_commands(void);
 
+/* What the target's background has made of the temperatures, for the host's drive (heat_t, which has one layout on both). */
+void iss_probe_heat(void *heat);
+
 #endif

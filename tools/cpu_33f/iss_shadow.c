@@ -39,6 +39,9 @@ static void follow_commands(iss_board_t *b, const iss_commands_t *c)
     board_drive.command.run = c->run;
     board_drive.command.clear_fault = c->clear_fault;
     board_drive.command.target_erpm = c->target_erpm;
+#if HEAT_USED
+    iss_probe_heat(&board_drive.heat);
+#endif
 #ifdef SNAPSHOT
     SnapStart = c->snap_start;
 #endif

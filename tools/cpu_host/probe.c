@@ -90,6 +90,18 @@
 #define SNAPSHOT_SIGNALS(X)
 #endif
 
+#if MOTOR_NTC_USED
+#define MOTOR_NTC_SIGNALS(X) X(motor_c, "fw.motor_c", "degC", "temperature of the motor's NTC", (double)d->heat.motor.celsius_q4 / 16.0)
+#else
+#define MOTOR_NTC_SIGNALS(X)
+#endif
+#if BRIDGE_NTC_USED
+#define BRIDGE_NTC_SIGNALS(X) X(bridge_c, "fw.bridge_c", "degC", "temperature of the bridge's NTC", (double)d->heat.bridge.celsius_q4 / 16.0)
+#else
+#define BRIDGE_NTC_SIGNALS(X)
+#endif
+#define HEAT_SIGNALS(X) MOTOR_NTC_SIGNALS(X) BRIDGE_NTC_SIGNALS(X)
+
 #define SIGNAL_FUNCTION(id, name, unit, meaning, value) \
     static double read_##id(void) \
     { \
@@ -99,10 +111,11 @@
     }
 DRIVE_SIGNALS(SIGNAL_FUNCTION)
 PROFILE_SIGNALS(SIGNAL_FUNCTION)
+HEAT_SIGNALS(SIGNAL_FUNCTION)
 SNAPSHOT_SIGNALS(SIGNAL_FUNCTION)
 
 #define SIGNAL_ROW(id, name, unit, meaning, value) { name, unit, meaning, read_##id },
-const probe_signal_t probe_signals[] = { DRIVE_SIGNALS(SIGNAL_ROW) PROFILE_SIGNALS(SIGNAL_ROW) SNAPSHOT_SIGNALS(SIGNAL_ROW) };
+const probe_signal_t probe_signals[] = { DRIVE_SIGNALS(SIGNAL_ROW) PROFILE_SIGNALS(SIGNAL_ROW) HEAT_SIGNALS(SIGNAL_ROW) SNAPSHOT_SIGNALS(SIGNAL_ROW) };
 const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[0];
 
 #define PARAM_ENTRY(name, unit, min, max, value, meaning) { #name, (double)PARAM_F(name), unit },

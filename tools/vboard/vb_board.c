@@ -76,6 +76,7 @@ int vb_power_up(vb_t *vb)
     plant_inverter_reset(&vb->plant);
     vb->plant.motor.torque_nm = 0.0; /* of currents that are gone */
     vb->plant.supply.bus_v = vb->plant.supply.voltage_v;
+    vb->analogue.motor_ntc.temp_c = vb->plant.motor.temp_c;
     chip_pwm_reset(&vb->chip);
     chip_adc_reset(&vb->chip);
     chip_ports_show(&vb->chip);
@@ -172,6 +173,7 @@ static void run_period(vb_t *vb)
     plant->inverter.bus_as = 0.0;
     vb->stat.energy_shaft_j += plant->motor.torque_nms * plant->motor.omega / plant->motor.pole_pairs;
     plant_motor_mechanics(&plant->motor, period_s);
+    vb_circuit_warm(vb, period_s);
     vb_stat_collect(vb, period_s);
     plant->start_s += period_s;
     plant->now_s = 0.0;

@@ -1,12 +1,16 @@
 /* What the MCLV board has between chip and plant: buttons, potentiometer, comparator, current amplifiers, bus divider, and the wiring. */
 #include "vb_state.h"
 
+#include <math.h>
+
 #define REFERENCE_V 3.3
+#define ZERO_C_K 273.15
 
 enum { FLTA_RP = 8, LED_PORT = 2, LED_BIT = 6, LEDS = 2 }; /* FLTA1 is on RB8, the LEDs on RC6 and RC7 */
 /* The direction input is RA4, CN0; the outputs of a product are on port A, each with a pull-down before its switch. */
 enum { DIRECTION_BIT = 4, DIRECTION_CN = 0 };
 static const unsigned switch_bit[] = { [VB_FAULT_RELAY] = 7, [VB_RUNNING_RELAY] = 10, [VB_BRAKE] = 9 };
+enum { MOTOR_NTC_AN = 6, BRIDGE_NTC_AN = 7 };
 enum { FLTA_DEAD = 1, FLTA_INVERTED = 2, SWAPPED = 1, FIRST_DEAD = 2 };
 
 /* Is the button S2 (0) or S3 (1) pressed, as its pin sees it? */
@@ -99,6 +103,21 @@ static double current_voltage(vb_t *vb, unsigned leg)
     return sensed(vb, &vb->analogue.current[leg], i, -vb->analogue.gain_v_per_a, zero_v);
 }
 
+/* The thermistor to ground, its resistor to the reference. */
+static double ntc_voltage(vb_t *vb, vb_ntc_t *ntc)
+{
+    double ohm = ntc->ohm * exp(ntc->beta_k * (1.0 / (ntc->temp_c + ZERO_C_K) - 1.0 / (25.0 + ZERO_C_K)));
+    return sensed(vb, &ntc->sense, ohm / (ohm + ntc->divider_ohm), REFERENCE_V, 0.0);
+}
+
+/* The motor's thermistor follows the winding. */
+void vb_circuit_warm(vb_t *vb, double period_s)
+{
+    vb_ntc_t *ntc = &vb->analogue.motor_ntc;
+    double winding_c = vb->plant.motor.temp_c;
+    ntc->temp_c += (winding_c - ntc->temp_c) * (ntc->lag_s > period_s ? period_s / ntc->lag_s : 1.0);
+}
+
 /* Voltage at the analogue input AN<input>. */
 static double input_voltage(void *context, unsigned input)
 {
@@ -110,6 +129,8 @@ static double input_voltage(void *context, unsigned input)
     case 3:
     case 4:
     case 5: return vb->plant.inverter.v[input - 3] / vb->analogue.vbus_ratio;
+    case MOTOR_NTC_AN: return ntc_voltage(vb, &vb->analogue.motor_ntc);
+    case BRIDGE_NTC_AN: return ntc_voltage(vb, &vb->analogue.bridge_ntc);
     case 8: return sensed(vb, &vb->analogue.pot, vb->controls.pot_zero + vb->controls.pot * (1.0 - 2.0 * vb->controls.pot_zero), REFERENCE_V, 0.0);
     default: return 0.0;
     }
@@ -128,5 +149,5 @@ static void warn(void *context, const char *format, va_list args)
 const chip_board_t vb_circuit = {
     .levels = levels, .input_v = input_voltage, .sampled = sampled, .served = vb_served, .send = vb_serial_send,
     .receive = vb_serial_receive, .warn = warn,
-    .fault_rp = FLTA_RP, .channel = {{8, "the potentiometer"}, {0, "IA"}, {1, "IB"}, {2, "VBUS"}},
+    .fault_rp = FLTA_RP, .channel = {{8, "the potentiometer", 1u << MOTOR_NTC_AN | 1u << BRIDGE_NTC_AN}, {0, "IA", 0}, {1, "IB", 0}, {2, "VBUS", 0}},
 };

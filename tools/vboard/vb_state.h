@@ -33,11 +33,18 @@ typedef struct {
     double last_v;          /* at the pin, at the last conversion */
 } vb_sense_t;
 
+/* An NTC thermistor to ground with a resistor to the reference; lag_s: how it follows what it measures (vb_circuit.c). */
+typedef struct {
+    double ohm, beta_k, divider_ohm, lag_s, temp_c;
+    vb_sense_t sense;
+} vb_ntc_t;
+
 /* Amplifiers and dividers before the ADC (vb_circuit.c). */
 typedef struct {
     double vbus_ratio, offset_v, gain_v_per_a, shunt_offset_v[2], settle_s;
     double ia_invalid, ib_invalid;
     vb_sense_t current[2], bus, pot;
+    vb_ntc_t motor_ntc, bridge_ntc;
 } vb_analogue_t;
 
 /* The serial line (vb_serial.c). */
@@ -114,6 +121,7 @@ double vb_keys_read(const vb_t *vb, const vb_access_t *access);
 
 /* vb_circuit.c */
 extern const chip_board_t vb_circuit;
+void vb_circuit_warm(vb_t *vb, double period_s);
 void vb_circuit_comparator(vb_t *vb, bool period_start);
 double vb_circuit_led(const vb_t *vb, unsigned led);
 enum { VB_FAULT_RELAY, VB_RUNNING_RELAY, VB_BRAKE }; /* switches behind the outputs of a product, which a pin closes while it drives high */

@@ -7,6 +7,7 @@
  *     hand-over: from w = 2 pi 20 Hz (PARAM_EARLY_HZ) or 1.25 times the minimum speed on; the estimator's lock is as quick as the rotor turns
  *     i2t:   dh/dt = (i^2 - h)/T, too hot from h = I2T_CURRENT_A^2                        (drive/protection.h)
  *     flux:  E - V_dead - (R's part) - (L's part) > F E (1 + k)                           (drive/protection.h)
+ *     NTC:   R(T) = R25 exp(B (1/T - 1/T25)), share of the reference at the converter R/(R + Rd)    (drive/heat.h)
  *     d current off: noise, and V_dead/Kp, what dead time drives against its controller   (drive/signals.h)
  *
  * Times in steps of the slot that counts them (drive/schedule.h); the tolerances are those that make robust promises
@@ -68,6 +69,25 @@
 #define CHOPPER_OFF_Q15 BUS_Q15(PARAM_F(BRAKE_CHOPPER_V) * (1.0F - PARAM_F(CHOPPER_BAND_SHARE)))
 #define CHOPPER_SHARE_Q10 ((uint16_t)(PARAM_F(BRAKE_CHOPPER_SHARE) * 1024.0F + 0.01F))
 #define CHOPPER_MOST_Q10 ((uint32_t)(PARAM_F(CHOPPER_SHARE_Q10) * PARAM_F(BRAKE_CHOPPER_SEC) / PARAM_F(LOOPTIME_SEC)))
+
+/* ---- NTC thermistors: their share of the converter's reference every NTC_STEP_C from NTC_LEAST_C on; a line lies between. e^x is the eighth power of a
+ *      Pade approximation, right to 2e-5 for what an NTC has ---- */
+#define NTC_LEAST_C (-40)
+#define NTC_STEP_C 16
+#define NTC_NODES 13
+#define NTC_MOST_C 152
+#define PARAM_NTC_EXP_TOP(y, sign) (120.0F + (y) * (sign 60.0F + (y) * (12.0F + (y) * (sign 1.0F))))
+#define PARAM_NTC_EXP_EIGHTH(y) (PARAM_NTC_EXP_TOP(y, +) / PARAM_NTC_EXP_TOP(y, -))
+#define PARAM_SQUARED(x) ((x) * (x))
+#define PARAM_NTC_EXP(x) PARAM_SQUARED(PARAM_SQUARED(PARAM_SQUARED(PARAM_NTC_EXP_EIGHTH((x) / 8.0F))))
+#define PARAM_NTC_SHARE(stem, celsius) \
+    (1.0F / (1.0F + PARAM_F(stem##_NTC_DIVIDER_OHM) / PARAM_F(stem##_NTC_OHM) * PARAM_NTC_EXP(PARAM_F(stem##_NTC_BETA_K) * (1.0F / 298.15F - 1.0F / (273.15F + PARAM_F(celsius))))))
+#define PARAM_NTC_NODE(stem, n) ((uint16_t)(65536.0F * PARAM_NTC_SHARE(stem, NTC_LEAST_C + NTC_STEP_C * (n)) + 0.5F))
+#define CELSIUS_Q4(celsius) ((int16_t)PARAM_ROUND(16.0F * PARAM_F(celsius)))
+
+/** Driving current that a sixteenth of a degree takes off between DERATE_C and TRIP_C, Q13 counts * 256. */
+#define PARAM_NTC_DERATE_Q8(stem) \
+    (256.0F * (1.0F - 1.0F / PARAM_F(DERATE_LEAST)) * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) / (16.0F * (PARAM_F(stem##_TRIP_C) - PARAM_F(stem##_DERATE_C))))
 
 /** The fields of drive_params_t that are the protection's, and the limits'. */
 #define PARAM_PROTECTION_INIT \
