@@ -50,7 +50,7 @@ void test_reasons_are_bits_of_their_own(void)
     TEST_ASSERT_EQUAL_HEX16(LIMIT_##name, (bit)); \
     all |= (bit);
     DRIVE_LIMIT_TABLE(ADD)
-    TEST_ASSERT_EQUAL_HEX16(8191, all);
+    TEST_ASSERT_EQUAL_HEX16(16383, all);
 }
 
 void test_drive_that_has_what_it_asks_for_has_no_reason(void)
