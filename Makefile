@@ -68,6 +68,7 @@ comma := ,
 quoted = '$(subst ','\'',$1)'
 # What an application asks of the board by what it includes.
 app_wishes := $(shell grep -qE '^ *$(hash) *include *"app/line\.h"' $(call quoted,$(or $(filter-out $(app_copy),$(app_source)),$(APP))) 2>/dev/null && echo -DAPP_SERIAL=1)
+app_wishes += $(shell grep -qE '^ *$(hash) *include *"app/pulse\.h"' $(call quoted,$(or $(filter-out $(app_copy),$(app_source)),$(APP))) 2>/dev/null && echo -DAPP_PULSE=1)
 # Writes the text to the target only if it is new, so that what depends on the target is made again only then.
 remember_lines = @mkdir -p $(@D); printf '%s\n' $1 | cmp -s - $@ || printf '%s\n' $1 >$@
 remember = @mkdir -p $(@D); printf '%s\n' $(call quoted,$1) | cmp -s - $@ || printf '%s\n' $(call quoted,$1) >$@

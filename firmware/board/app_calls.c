@@ -1,8 +1,11 @@
-/* What an application calls: shares, units, lights; and, where APP_SERIAL is 1, the serial line: lines heard and said, words, numbers, the checksum.
+/* What an application calls: shares, units, lights; where APP_SERIAL is 1, the serial line: lines heard and said, words, numbers, the checksum; where
+ * APP_PULSE is 1, the pulses at the command input.
  * The linker drops what it does not call. */
 #include "board/app_calls.h"
 
 #include "app/line.h"
+#include "app/pulse.h"
+#include "board/mclv.h"
 #include "board/peripherals.h"
 #include "board/reset.h"
 #include "board/status.h"
@@ -184,6 +187,98 @@ void app_line_end(const char *line, char *end)
     end[1] = digit_of((uint16_t)(sum >> 4));
     end[2] = digit_of(sum);
     end[3] = '\0';
+}
+
+#endif
+
+#if APP_PULSE
+
+PIN_NEEDS(a_count_is_200_ns, BOARD_FCY_HZ / 8u == 5000000u);
+#define PULSE_MOST APP_PULSE_US(11000u)              /* a longer one, or an end that came before the begin */
+#define PULSE_QUICK APP_PULSE_US(4000u)              /* of a shorter period more edges may have come than the captures hold */
+#define PULSE_ONCE_ROUND_TICKS PARAM_PERIODS(0.012F) /* the count goes round in 13.1 ms, and a pass takes up to 1 */
+
+static struct {
+    uint16_t has_begun, begin_200ns, begin_ticks; /* ticks when the begin was read */
+    uint16_t length_200ns;                        /* 0: its end has not come */
+} pulse;
+static uint16_t told_pulse_200ns, told_period_200ns; /* for the application */
+
+/** Both captures empty: what comes next is in order, whatever was lost. */
+static void pulse_restart(void)
+{
+    IC1CON = 0;
+    IC2CON = 0;
+    IC1CON = BOARD_IC1CON;
+    IC2CON = BOARD_IC2CON;
+    pulse.has_begun = 0;
+    pulse.length_200ns = 0;
+}
+
+static void pulse_begins(uint16_t begin_200ns, uint16_t ticks)
+{
+    pulse.has_begun = 1;
+    pulse.begin_200ns = begin_200ns;
+    pulse.begin_ticks = ticks;
+    pulse.length_200ns = 0;
+}
+
+/** The next pulse begins. IC2 starts later than IC1 by less than a period, so that the end is perhaps the next one's. */
+static void pulse_is_over(uint16_t begin_200ns, uint16_t ticks)
+{
+    const uint16_t length_200ns = pulse.length_200ns, is_once = (uint16_t)(ticks - pulse.begin_ticks) <= PULSE_ONCE_ROUND_TICKS;
+    const uint16_t period_200ns = is_once ? (uint16_t)(begin_200ns - pulse.begin_200ns) : 65535u;
+    if (length_200ns != 0u) {
+        told_pulse_200ns = (length_200ns > period_200ns) ? (uint16_t)(length_200ns - period_200ns) : length_200ns;
+        told_period_200ns = period_200ns;
+    }
+    if (length_200ns == 0u || period_200ns < PULSE_QUICK) {
+        pulse_restart();
+    } else {
+        pulse_begins(begin_200ns, ticks);
+    }
+}
+
+void app_pulse_init(void)
+{
+    clock_write_low((uint16_t)(OSCCON & ~0x0040u)); /* unlock the pin selection */
+    RPINR7 = BOARD_RPINR7;
+    clock_write_low((uint16_t)(OSCCON | 0x0040u));
+    T3CON = 0;
+    PR3 = 0xFFFFu;
+    T3CON = BOARD_T3CON;
+    told_pulse_200ns = 0;
+    pulse_restart();
+}
+
+void app_pulse_look(uint16_t ticks)
+{
+    uint16_t begins = IC1CONbits.ICBNE;
+    if (begins && !pulse.has_begun) {
+        pulse_begins(IC1BUF, ticks);
+        begins = 0;
+    } else if (begins && pulse.length_200ns != 0u) { /* before its own end is looked at, which may have come, too */
+        pulse_is_over(IC1BUF, ticks);
+        begins = 0;
+    } else { /* perhaps the end has come, too */
+    }
+    if (IC2CONbits.ICBNE) {
+        const uint16_t length_200ns = (uint16_t)(IC2BUF - pulse.begin_200ns);
+        if (pulse.has_begun && pulse.length_200ns == 0u && length_200ns < PULSE_MOST
+            && (uint16_t)(ticks - pulse.begin_ticks) <= PULSE_ONCE_ROUND_TICKS) {
+            pulse.length_200ns = length_200ns;
+        }
+    }
+    if (begins) {
+        pulse_is_over(IC1BUF, ticks);
+    }
+}
+
+void app_pulse_take(app_told_t *told)
+{
+    told->pulse_200ns = told_pulse_200ns;
+    told->period_200ns = told_period_200ns;
+    told_pulse_200ns = 0;
 }
 
 #endif

@@ -92,6 +92,7 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     told->heard = app_line_heard();
     asks->say = 0;
 #endif
+    app_pulse_take(told);
 }
 
 /** Of an application that was late and has returned: what it asks is a stop, and once that is over the fault has its name. */

@@ -1,6 +1,7 @@
 /* Start-up order and the background loop: panel, supervision of the control interrupt, watch variables, status line. */
 #include "board/firmware.h"
 
+#include "board/app_calls.h"
 #include "board/application.h"
 #include "board/mclv.h"
 #include "board/modes/mode_board.h"
@@ -80,6 +81,7 @@ void firmware_init(void)
     selftest_start(kept);
     status_init();
     pins_init();
+    app_pulse_init();
     uart_init();
     timer_init();
     pwm_init();
@@ -196,6 +198,7 @@ void firmware_background(void)
 {
     uint16_t elapsed_ms = (uint16_t)((uint16_t)(board_drive.ticks - last_ms_tick) / PERIODS_PER_MS);
     firmware_supervise();
+    app_pulse_look(board_drive.ticks);
     if (elapsed_ms != 0u) {
         last_ms_tick = (uint16_t)(last_ms_tick + elapsed_ms * PERIODS_PER_MS);
         if (!mode_panel(elapsed_ms)) {

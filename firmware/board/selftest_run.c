@@ -2,6 +2,7 @@
 #include "board/selftest_run.h"
 
 #ifndef SELFTEST_OFF
+#include "board/app_calls.h"
 #include "board/application.h"
 #include "board/firmware.h"
 #include "board/peripherals.h"
@@ -87,6 +88,14 @@ static const written_t written[] = {
     { &INTCON2, 0x8000u, 0u },
     { &CORCON, 0x10F7u, 0x0024u },
     { &MODCON, 0xC000u, 0u },
+#if APP_PULSE
+    { &RPINR7, 0x1F1Fu, BOARD_RPINR7 },
+    { &T3CON, 0xA072u, BOARD_T3CON },
+    { &PR3, 0xFFFFu, 0xFFFFu },
+    { &IC1CON, 0x2087u, BOARD_IC1CON },
+    { &IC2CON, 0x2087u, BOARD_IC2CON },
+    { &PMD2, 0x0300u, 0u },
+#endif
 };
 
 static void test_registers(void)

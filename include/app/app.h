@@ -21,6 +21,10 @@
 #ifndef APP_SERIAL
 #define APP_SERIAL 0
 #endif
+/** 1: the application is told of pulses at the command input. The Makefile sets it for one that includes app/pulse.h. */
+#ifndef APP_PULSE
+#define APP_PULSE 0
+#endif
 #define APP_LINE_SIZE 64u /* of a line heard or said, with its end */
 
 /** Counts of a speed, current or voltage that is a constant. A speed is electrical rpm in counts of SPEED_UNIT, a current full scale / 8192. */
@@ -92,6 +96,10 @@ typedef struct {
     app_range_t fast; /**< NOMINAL_SPEED_RPM .. MAXIMUM_SPEED_RPM; TORQUE_MODE: as slow */
 #if APP_SERIAL
     char *heard; /**< a line that has come, without its end; 0 without. Only for this call */
+#endif
+#if APP_PULSE
+    uint16_t pulse_200ns;  /**< length of the last pulse that was measured since the last call, APP_PULSE_US(), below 11 ms; 0: none was */
+    uint16_t period_200ns; /**< from its begin to the next one's; 65535 beyond 12 ms */
 #endif
 } app_told_t;
 

@@ -1,4 +1,5 @@
-/* What an application calls, as the board sees it: the serial line of one that has it (app/line.h). Nothing where APP_SERIAL is 0. */
+/* What an application calls, as the board sees it: the serial line of one that has it (app/line.h), the pulses of one that is told of them (app/pulse.h).
+ * Nothing where APP_SERIAL and APP_PULSE are 0. */
 #ifndef BOARD_APP_CALLS_H
 #define BOARD_APP_CALLS_H
 
@@ -23,6 +24,21 @@ char *app_line_next(char *line);
 #define app_line_init() ((void)0)
 #define app_line_hear() ((void)0)
 #define app_line_next(line) (line)
+#endif
+
+#if APP_PULSE
+/** Timer 3 and the captures of both edges, after pins_init(). */
+void app_pulse_init(void);
+
+/** Each pass of the background: an edge that has come. @param ticks of the drive */
+void app_pulse_look(uint16_t ticks);
+
+/** What the application is told: the last pulse since the call before. */
+void app_pulse_take(app_told_t *told);
+#else
+#define app_pulse_init() ((void)0)
+#define app_pulse_look(ticks) ((void)0)
+#define app_pulse_take(told) ((void)0)
 #endif
 
 #endif

@@ -36,6 +36,7 @@
 #define BOARD_LEVEL_FAULT_OUTPUT 0u   /* while there is a fault, and from power-up until the first period says that there is none */
 #define BOARD_LEVEL_RUNNING_OUTPUT 1u /* while the bridge conducts */
 #define BOARD_LEVEL_CHOPPER 1u        /* while the brake resistor is on */
+#define BOARD_PIN_PULSE B, 7     /* pulses as a command, of an application with app/pulse.h; [?] a free pin until it is known */
 /* The chip fixes the PWM pins; a low side is one bit above its high side. */
 #define BOARD_PIN_PWM_A B, 14 /* PWM of phase A (M1), high side; published code */
 #define BOARD_PIN_PWM_B B, 12 /* PWM of phase B (M2), high side; published code */
@@ -49,6 +50,7 @@ PIN_NEEDS(temperatures_have_AN_numbers, PIN_AN(BOARD_PIN_MOTOR_NTC) >= 0 && PIN_
 PIN_NEEDS(fault_input_has_an_RP_number, PIN_RP(BOARD_PIN_FAULT) >= 0);
 PIN_NEEDS(direction_input_has_a_pull_up, !(DIRECTION_INPUT_USED) || PIN_CN(BOARD_PIN_DIRECTION) >= 0);
 PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(BOARD_PIN_UART_RX) >= 0);
+PIN_NEEDS(pulses_have_an_RP_number, PIN_RP(BOARD_PIN_PULSE) >= 0);
 
 #ifdef __XC16__
 #define BOARD_ISR __attribute__((interrupt, no_auto_psv, externally_visible))
@@ -122,6 +124,13 @@ PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(B
 #define BOARD_U1BRG 86u           /* BRGH 1: 40e6 / (4 * 87) = 114943 baud, -0.2 % */
 #define BOARD_UART_TX_FUNCTION 3u /* RPnR code of U1TX */
 #define BOARD_UART_RX_RP ((uint16_t)PIN_RP(BOARD_PIN_UART_RX))
+
+/* ---- Pulses, with app/pulse.h: IC1 captures where they begin, IC2 where they end, both timer 3 on a count of 200 ns ---- */
+#define BOARD_PULSE_LOW 0 /* 1: a pulse is low at the pin, as behind an opto-coupler */
+#define BOARD_RPINR7 ((uint16_t)(PIN_RP(BOARD_PIN_PULSE) * 0x0101u))
+#define BOARD_T3CON 0x8010u                        /* 1:8 */
+#define BOARD_IC1CON ((BOARD_PULSE_LOW) ? 2u : 3u) /* ICM: every falling or rising edge; no interrupt */
+#define BOARD_IC2CON ((BOARD_PULSE_LOW) ? 3u : 2u)
 
 /* ---- LEDs ---- */
 #define BOARD_LED_ALIVE PIN_LATCH(BOARD_PIN_LED_ALIVE)

@@ -61,8 +61,8 @@
       "voltages and currents did not fit the motor, and one phase carried much less current than the others; or it carried hardly any of what was asked of it", \
       "check the motor's wires, the transistors of that phase and its current signal") \
     X(17, POTENTIOMETER, FAULT_STAYS, "panel_tick, application_fault", \
-      "the potentiometer's signal was in the dead ends of POT_LIVE_ZERO, where no position of it is", \
-      "check its three wires") \
+      "the potentiometer's signal was in the dead ends of POT_LIVE_ZERO, where no position of it is; or an application's command signal was lost", \
+      "check its three wires, or those of the signal") \
     X(18, INTERRUPT_RATE, FAULT_STAYS, "firmware_count_interrupts", \
       "too few control interrupts in a tenth of a second", \
       "look for what holds interrupts up; check the PWM and ADC set-up") \

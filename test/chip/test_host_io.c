@@ -140,3 +140,80 @@ void test_received_characters_interrupt(void)
     run(400);
     TEST_ASSERT_EQUAL_UINT(3, fake_rx_calls);
 }
+
+static uint16_t captured[64], captures;
+
+static void keep_captures(void)
+{
+    if (IC1CONbits.ICBNE && captures < 64) {
+        captured[captures++] = IC1BUF;
+    }
+}
+
+static void capture_pulses(void)
+{
+    captures = 0;
+    at_init("RPINR7", 7);
+    at_init("T3CON", 0x8010);
+    at_init("IC1CON", 3);
+    set("input.pulse_hz", 1000.0);
+    set("input.pulse_us", 300.0);
+}
+
+void test_the_main_loop_reads_one_capture_a_pass(void)
+{
+    capture_pulses();
+    fake_background_hook = keep_captures;
+    start(400);
+    TEST_ASSERT_UINT_WITHIN(1, 19, captures);
+    for (unsigned n = 1; n < captures; n++) {
+        TEST_ASSERT_UINT_WITHIN(1, 5000, (uint16_t)(captured[n] - captured[n - 1]));
+    }
+    TEST_ASSERT_FALSE(warned_about("RPINR7"));
+}
+
+static uint16_t restarted_at;
+
+static void restart_capture(void)
+{
+    restarted_at = TMR3;
+    IC1CON = 0;
+    IC1CON = 3;
+}
+
+void test_a_capture_that_is_switched_off_and_on_begins_anew(void)
+{
+    capture_pulses();
+    set("input.pulse_hz", 10000.0);
+    set("input.pulse_us", 30.0);
+    start(60);
+    TEST_ASSERT_EQUAL_HEX16(0x001B, IC1CON); /* two come in a pass, and one is read */
+    fake_background_hook = restart_capture;
+    run(4);
+    TEST_ASSERT_EQUAL_HEX16(0x0003, IC1CON & 0x0017); /* one may have come in the pass's period */
+    fake_background_hook = keep_captures;
+    run(20);
+    TEST_ASSERT_GREATER_THAN_UINT(0, captures);
+    for (unsigned n = 0; n < captures; n++) {
+        TEST_ASSERT_LESS_THAN_UINT16(7500, captured[n] - restarted_at + 250); /* 250: that period */
+    }
+}
+
+static void set_timer(void)
+{
+    keep_captures();
+    TMR3 = 1000;
+}
+
+void test_a_count_that_is_written_holds_for_the_edges_of_that_period_too(void)
+{
+    capture_pulses();
+    set("input.pulse_hz", 9700.0);
+    set("input.pulse_us", 30.0);
+    fake_background_hook = set_timer;
+    start(200);
+    TEST_ASSERT_GREATER_THAN_UINT(45, captures);
+    for (unsigned n = 4; n < captures; n++) {
+        TEST_ASSERT_UINT_WITHIN(525, 1525, captured[n]); /* a count from 1000 on, to the next pass or the one behind it */
+    }
+}

@@ -314,6 +314,154 @@ def test_beyond_its_period_register_the_flag_comes_after_a_whole_round() -> None
     assert chip.peek(RAM + 2) < 8
 
 
+# ---- input capture -------------------------------------------------------------------------------------------------------
+
+COUNT_200NS = "setm pr3; mov #0x8010, w0; mov w0, t3con; setm pr2; mov #0x8020, w0; mov w0, t2con\n" # timer 2 counts 1.6 us
+PULSES = PLL + "mov #0x0707, w0; mov w0, rpinr7; mov w0, rpinr10\n" + COUNT_200NS + f"mov #{RAM}, w4\n"
+KEEP_ALL = "again: btss {con}, #3; bra again; mov {buf}, w1; mov w1, [w4++]; mov #{end}, w2; cp w4, w2; bra nz, again\n" + STOP
+
+
+def pulsed(program: str, ms: float, hz: float = 1000.0, **keys: float) -> PilBoard:
+    """After so long with pulses at RB7, a quarter of the period each; they begin when the captures are on."""
+    chip = board(program)
+    pass_ms(chip, 2.0)
+    for key, value in {"pulse_hz": hz, "pulse_duty": 0.25, **keys}.items():
+        chip.set(f"input.{key}", value)
+    pass_ms(chip, ms)
+    return chip
+
+
+def steps(chip: PilBoard, count: int) -> list[int]:
+    """Differences of the counts in RAM."""
+    words = [chip.peek(RAM + 2 * n) for n in range(count)]
+    return [(after - before) & 0xFFFF for before, after in zip(words, words[1:])]
+
+
+@pytest.mark.parametrize("mode, expected", [(1, [3750, 1250, 3750, 1250]), (2, [5000] * 4), (3, [5000] * 4), (4, [20000] * 4),
+                                            (5, [80000 - 65536] * 4)])
+def test_each_capture_mode_has_its_edges(mode: int, expected: list[int]) -> None:
+    program = PULSES + f"mov #{mode}, w0; mov w0, ic1con\n" + KEEP_ALL.format(con="ic1con", buf="ic1buf", end=RAM + 10)
+    assert steps(pulsed(program, 90), 5) == approx(expected, abs=1)
+
+
+def test_a_pulse_is_captured_at_both_its_edges_by_two_captures_at_one_pin() -> None:
+    program = PULSES + ("mov #2, w0; mov w0, ic2con; mov #3, w0; mov w0, ic1con\nfirst: btss ic2con, #3; bra first; mov ic2buf, w1\nrise: btss ic1con, #3; bra rise; mov ic1buf, w1; mov w1, [w4++]\n"
+                        "fall: btss ic2con, #3; bra fall; mov ic2buf, w1; mov w1, [w4++]\n") + STOP
+    for wrong in (0, 1):
+        chip = board(program)
+        chip.set("wiring.pulse", wrong)
+        pass_ms(chip, 2.0)
+        for key, value in (("pulse_duty", 0.0), ("pulse_us", 1300.0), ("pulse_hz", 50.0)):
+            chip.set(f"input.{key}", value)
+        pass_ms(chip, 45)
+        assert steps(chip, 2) == [approx((1300 * 5, 18700 * 5 - 65536)[wrong], abs=1)]
+
+
+def test_ictmr_chooses_timer_2() -> None:
+    program = PULSES + "mov #0x83, w0; mov w0, ic1con\n" + KEEP_ALL.format(con="ic1con", buf="ic1buf", end=RAM + 6)
+    assert steps(pulsed(program, 10), 3) == [approx(625, abs=1)] * 2
+
+
+@pytest.mark.parametrize("con, word, bit", [("ic1con", "ifs0", 1), ("ic2con", "ifs0", 5), ("ic7con", "ifs1", 6), ("ic8con", "ifs1", 7)])
+def test_each_capture_has_its_flag_and_its_buffer(con: str, word: str, bit: int) -> None:
+    program = PULSES + f"mov #0x5A, w0; mov w0, {con.replace('con', 'buf')}; mov #3, w0; mov w0, {con}\n"
+    chip = pulsed(program + KEEP_ALL.format(con=con, buf=con.replace("con", "buf"), end=RAM + 4), 5)
+    assert steps(chip, 2) == [approx(5000, abs=1)]
+    flags = {"ifs0": int(chip.get("reg.IFS0")) & 0x22, "ifs1": int(chip.get("reg.IFS1")) & 0xC0}
+    assert flags == {"ifs0": 0, "ifs1": 0, word: 1 << bit}
+
+
+@pytest.mark.parametrize("ici", range(4))
+def test_the_interrupt_comes_with_every_first_to_fourth_capture(ici: int) -> None:
+    program = PULSES + (f"mov #{3 | ici << 5}, w0; mov w0, ic1con; clr {RAM}\n"
+                        f"again: mov ic1buf, w1; btss ifs0, #1; bra again; bclr ifs0, #1; inc {RAM}; bra again\n")
+    chip = pulsed(program, 10)
+    before = chip.peek(RAM)
+    pass_ms(chip, 24)
+    assert chip.peek(RAM) - before == 24 // (ici + 1)
+
+
+def test_every_edge_ignores_the_choice_of_interrupts() -> None:
+    chip = pulsed(PULSES + f"mov #0x61, w0; mov w0, ic1con; clr {RAM}\n"
+                  f"again: mov ic1buf, w1; btss ifs0, #1; bra again; bclr ifs0, #1; inc {RAM}; bra again\n", 10)
+    before = chip.peek(RAM)
+    pass_ms(chip, 10)
+    assert chip.peek(RAM) - before == 20
+
+
+@pytest.mark.parametrize("mode, overflow", [(3, 0x10), (1, 0)])
+def test_a_full_fifo_keeps_the_first_four_and_says_so(mode: int, overflow: int) -> None:
+    program = PULSES + f"mov #{mode}, w0; mov w0, ic1con; mov #20000, w5; wait: repeat #18; nop; dec w5, w5; bra nz, wait\n" + "".join(
+        "mov ic1con, w1; mov w1, [w4++]; mov ic1buf, w1; mov w1, [w4++]\n" for _ in range(5)) + STOP
+    chip = pulsed(program, 30)
+    states = [chip.peek(RAM + 4 * n) & 0x18 for n in range(5)]
+    counts = [chip.peek(RAM + 2 + 4 * n) for n in range(5)]
+    assert states == [8 | overflow] * 4 + [0]
+    assert [(after - before) & 0xFFFF for before, after in zip(counts, counts[1:4])] == [approx(5000 if mode == 3 else step, abs=1) for step in (3750, 1250, 3750)]
+    assert counts[4] == counts[3], "an empty one"
+
+
+def test_switched_off_it_forgets_and_captures_nothing() -> None:
+    off = "mov #20000, w5; {label}: repeat #18; nop; dec w5, w5; bra nz, {label}\n"
+    chip = pulsed(PULSES + "mov #3, w0; mov w0, ic1con\n" + off.format(label="a") + f"clr ic1con; mov ic1con, w1; mov w1, {RAM}\n"
+                  + off.format(label="b") + f"mov ic1con, w1; mov w1, {RAM + 2}\n" + STOP, 40)
+    assert [chip.peek(RAM), chip.peek(RAM + 2)] == [0, 0]
+
+
+@pytest.mark.parametrize("program, warning", [
+    ("mov #7, w0; mov w0, rpinr7\n" + COUNT_200NS + "mov #3, w0; mov w0, ic1con\n", ""),
+    (COUNT_200NS + "mov #3, w0; mov w0, ic1con\n", "RPINR7: IC1 has no pin"),
+    (COUNT_200NS + "mov #0x1F07, w0; mov w0, rpinr10; mov #3, w0; mov w0, ic8con\n", "RPINR10: IC8 has no pin"),
+    ("mov #9, w0; mov w0, rpinr7\n" + COUNT_200NS + "mov #3, w0; mov w0, ic1con\n", "RPINR7: IC1R is 9"),
+    ("mov #7, w0; mov w0, rpinr7; mov #3, w0; mov w0, ic1con\n", "T3CON: IC1 captures timer 3, which stands still"),
+    ("mov #7, w0; mov w0, rpinr7\n" + COUNT_200NS + "mov #6, w0; mov w0, ic1con\n", "IC1CON: mode 6")])
+def test_a_capture_that_cannot_work_is_told(program: str, warning: str) -> None:
+    chip = pulsed(PLL + program + STOP, 10)
+    found = [text for text in chip.warnings() if "IC" in text]
+    assert [warning in text for text in found] == ([True] if warning else []), found
+
+
+def test_the_pin_reads_the_pulses_and_what_is_wrong_with_them() -> None:
+    chip = pulsed(STOP, 10)
+
+    def high(ms: float = 10.0) -> float:
+        levels = []
+        for _ in range(round(ms * 20)):
+            chip.run(1)
+            levels.append(chip.get("pin.RB7"))
+        return sum(levels) / len(levels)
+
+    def now(**keys: float) -> float:
+        for key, value in keys.items():
+            chip.set(key.replace("__", "."), value)
+        pass_ms(chip, 2.0)
+        return high()
+
+    assert now() == approx(0.25, abs=0.03)
+    assert now(wiring__pulse=1) == approx(0.75, abs=0.03)
+    assert now(wiring__pulse=0, input__pulse_stuck=1) == 0.0
+    assert now(input__pulse_stuck=2) == 1.0
+    assert now(input__pulse_stuck=0, input__pulse_duty=0, input__pulse_us=600) == approx(0.6, abs=0.03)
+    assert now(input__pulse_us=2000) == 1.0, "as long as the period and longer"
+    assert now(input__pulse_us=0) == 0.0
+    assert now(input__pulse_us=300, input__pulse_odd=1000, input__pulse_odd_us=500) == approx(0.5, abs=0.03)
+    assert 985 <= chip.get("input.pulse_odd") <= 989
+    assert now(input__pulse_odd=0) == approx(0.3, abs=0.03)
+    assert now(input__pulse_hz=100) == approx(0.03, abs=0.03)
+    assert now(input__pulse_hz=0) == 1.0, "pulled up"
+
+
+def test_jitter_spreads_the_pulses_evenly_and_the_same_in_each_run() -> None:
+    program = PULSES + "mov #2, w0; mov w0, ic2con; mov #3, w0; mov w0, ic1con\n" + (
+        "first: btss ic2con, #3; bra first; mov ic2buf, w1\nagain: btss ic1con, #3; bra again; mov ic1buf, w1\nfall: btss ic2con, #3; bra fall; mov ic2buf, w2; sub w2, w1, w2; mov w2, [w4++]\n"
+        f"mov #{RAM + 200}, w2; cp w4, w2; bra nz, again\n") + STOP
+    chips = [pulsed(program, 260, 400.0, pulse_duty=0.0, pulse_us=1500.0, pulse_jitter_us=jitter) for jitter in (0.0, 200.0, 200.0)]
+    lengths = [[chip.peek(RAM + 2 * n) / 5 for n in range(100)] for chip in chips]
+    assert lengths[0] == [approx(1500, abs=0.3)] * 100
+    assert lengths[1] == lengths[2] and 1300 <= min(lengths[1]) < 1320 and 1680 < max(lengths[1]) <= 1700
+    assert sum(lengths[1]) / 100 == approx(1500, abs=25)
+
+
 # ---- UART ----------------------------------------------------------------------------------------------------------------
 
 FLAGS = PLL + UART + "mov #{sta}, w0; mov w0, u1sta; clr ifs0\n"

@@ -97,7 +97,13 @@ def relative(path: str) -> str:
 def configurations() -> list[tuple[str, ...]]:
     """Macros of each build that is looked at: as delivered, each mode alone, with the scope, with both temperatures, some modes together."""
     modes = re.findall(r"^ *X\((\w+), ", MODE_TABLE.read_text(encoding="utf-8"), re.M)
-    return [(), *((mode,) for mode in modes), ("SCOPE",), ("APP_SERIAL",), ("MOTOR_NTC_USED", "BRIDGE_NTC_USED"), *COMBINED]
+    return [(), *((mode,) for mode in modes), ("SCOPE",), ("APP_SERIAL",), ("APP_PULSE",), ("MOTOR_NTC_USED", "BRIDGE_NTC_USED"), *COMBINED]
+
+
+def wishes(application: str) -> tuple[str, ...]:
+    """What an application asks of the board by what it includes, as in the Makefile."""
+    text = Path(application).read_text(encoding="utf-8")
+    return tuple(name for header, name in (("app/line.h", "APP_SERIAL"), ("app/pulse.h", "APP_PULSE")) if header in text)
 
 
 def defines(configuration: tuple[str, ...]) -> list[str]:
@@ -209,7 +215,7 @@ def main() -> int:
 
     unit = one_unit(sources)
     texts = {source: distinct(source, configurations()) for source in (unit, *CHECKS_OF_PARAMETERS)}
-    texts |= {source: distinct(source, [("APP_SERIAL",) if "app/line.h" in Path(source).read_text(encoding="utf-8") else ()]) for source in other_applications()}
+    texts |= {source: distinct(source, [wishes(source)]) for source in other_applications()}
     jobs = [(source, defines(configuration)) for source, its in texts.items() for configuration in its]
     checks = {
         "cppcheck": lambda: cppcheck(unit, distinct(unit, [*configurations(), ON_TARGET]), sources),

@@ -40,7 +40,7 @@ def test_no_pin_is_there_twice_and_the_pwm_s_are_rb10_to_15():
 
 
 def test_the_firmware_s_pins_are_all_told():
-    assert len(pins.firmware()) == len(re.findall(r"^#define BOARD_PIN_", HEADER, re.MULTILINE)) == 20
+    assert len(pins.firmware()) == len(re.findall(r"^#define BOARD_PIN_", HEADER, re.MULTILINE)) == 21
     assert (pins.firmware()["fault"].pin, pins.firmware()["fault"].known_from) == ("RB8", "published code")
 
 

@@ -24,7 +24,7 @@ enum { SFR_TABLE(CHIP_ADDRESS) SFR_END = 0x0800 };
 #define CHIP_NEVER UINT64_MAX
 #define CHIP_IDLE_PERIOD_S 50e-6 /* length of a "PWM period" while the PWM does not run */
 
-enum { CHIP_CONFIG_WORDS = 12, CHIP_TIMERS = 3, CHIP_FIFO = 4, CHIP_WORDS = SFR_END / 2 };
+enum { CHIP_CONFIG_WORDS = 12, CHIP_TIMERS = 3, CHIP_CAPTURES = 4, CHIP_FIFO = 4, CHIP_WORDS = SFR_END / 2 };
 
 /* Index of a configuration word. */
 enum { CHIP_FBS = 0, CHIP_FGS = 2, CHIP_FOSCSEL = 3, CHIP_FOSC = 4, CHIP_FWDT = 5, CHIP_FPOR = 6, CHIP_FICD = 7, CHIP_FUID0 = 8 };
@@ -66,21 +66,23 @@ typedef struct {
  *   input_v    voltage at the analogue input AN<input>
  *   sampled    the sample-and-holds have just been opened
  *   served     nothing more will happen with this sample: its handler has run, or none will
+ *   signals    brings levels that change by themselves to what they are at a time since power-on; returns when one changes next, PLANT_NEVER without
  *   send       a character has left UART1
  *   receive    the next character for UART1, or -1
  *   warn       the firmware uses a peripheral in a way that cannot work; the text starts with the register's name
- *   fault_rp   the RPn pin with the fault signal; channel: the input that sample-and-hold 0..3 should take, its name, and a mask of others that it may
- *              take in turn */
+ *   fault_rp   the RPn pin with the fault signal; capture_rp: with the signal that IC1 and IC2 capture; channel: the input that sample-and-hold 0..3
+ *              should take, its name, and a mask of others that it may take in turn */
 typedef struct {
     void *context;
     void (*levels)(void *context, uint16_t level[3]);
     double (*input_v)(void *context, unsigned input);
     void (*sampled)(void *context);
     void (*served)(void *context);
+    double (*signals)(void *context, double now_s);
     void (*send)(void *context, uint8_t character);
     int (*receive)(void *context);
     void (*warn)(void *context, const char *format, va_list args);
-    unsigned fault_rp;
+    unsigned fault_rp, capture_rp;
     struct { unsigned input; const char *name; uint16_t others; } channel[4];
 } chip_board_t;
 
@@ -95,7 +97,7 @@ typedef struct {
 /* Things that happen by themselves at a cycle. */
 typedef enum {
     CHIP_EVENT_CLOCK, CHIP_EVENT_WATCHDOG, CHIP_EVENT_TIMER1, CHIP_EVENT_TIMER2, CHIP_EVENT_TIMER3, CHIP_EVENT_SEND,
-    CHIP_EVENT_RECEIVE, CHIP_EVENTS
+    CHIP_EVENT_RECEIVE, CHIP_EVENT_SIGNALS, CHIP_EVENTS
 } chip_event_t;
 
 /* ---- oscillator (chip_clock.c) ---- */
@@ -116,6 +118,15 @@ typedef struct {
     uint32_t base_count;
     bool counts;
 } chip_timer_t;
+
+/* An input capture, IC1, IC2, IC7 or IC8 (chip_capture.c). */
+typedef struct {
+    uint16_t fifo[CHIP_FIFO];
+    unsigned count;    /* in the FIFO */
+    unsigned edges;    /* since the last capture, where only every fourth or sixteenth is one */
+    unsigned captures; /* since the last interrupt */
+    bool level;        /* of its pin */
+} chip_capture_t;
 
 typedef struct {
     uint8_t tx[CHIP_FIFO], rx[CHIP_FIFO];
@@ -223,6 +234,8 @@ struct chip {
     double watchdog_end_s;
     chip_clock_t clock;
     chip_timer_t timer[CHIP_TIMERS];
+    chip_capture_t capture[CHIP_CAPTURES];
+    uint64_t signals_cycle;      /* when a level changes next */
     chip_uart_t uart;
     chip_pwm_t pwm;
     chip_fault_t fault;
@@ -319,6 +332,7 @@ void chip_watchdog_reschedule(chip_t *chip);
 void chip_ports_hooks(chip_t *chip);
 void chip_ports_show(chip_t *chip);
 unsigned chip_ports_pin(const chip_t *chip, unsigned port, unsigned bit);
+bool chip_ports_rp(const chip_t *chip, unsigned rp);
 bool chip_ports_fault(chip_t *chip);
 bool chip_ports_fault_used(chip_t *chip);
 enum { CHIP_FUNCTION_U1TX = 3 }; /* in RPORx */
@@ -331,6 +345,16 @@ void chip_timer_reset(chip_t *chip);
 void chip_timer_1(chip_t *chip); /* its count has reached the period register */
 void chip_timer_2(chip_t *chip);
 void chip_timer_3(chip_t *chip);
+uint16_t chip_timer_count(const chip_t *chip, unsigned n, uint64_t cycle); /* of timer n + 1 at a cycle since its last match */
+
+/* chip_capture.c */
+void chip_capture_hooks(chip_t *chip);
+void chip_capture_reset(chip_t *chip);
+void chip_capture_signals(chip_t *chip);                          /* a level changes */
+void chip_capture_follow(chip_t *chip);                           /* levels may have changed, or when they do */
+unsigned chip_capture_show(chip_t *chip);                         /* what ICxBUF reads, for who reads without a hook; a bit for each that has something */
+void chip_capture_drop(chip_t *chip, unsigned channel);           /* its oldest capture has been read */
+bool chip_capture_is_control(uint16_t address);                   /* ICxCON */
 
 /* chip_uart.c */
 void chip_uart_hooks(chip_t *chip);

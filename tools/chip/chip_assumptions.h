@@ -10,7 +10,11 @@
     X(PLL_LOCK_US, 1500, "us until the PLL has locked, after power-on and after a switch to it", "chip_clock.c ready_s") \
     X(CRYSTAL_START_PERIODS, 1024, "periods that the start-up timer of a crystal counts; an external clock needs none", "chip_clock.c ready_s") \
     X(UNLOCK_CYCLES, 2, "cycles within which each write of OSCCON's unlock sequence follows the one before", "chip_clock.c unlocked") \
-    X(RESET_KEEPS_CLOCK, 1, "a reset other than power-on goes on with the running clock, without waiting for it anew", "chip_clock.c chip_clock_reset")
+    X(RESET_KEEPS_CLOCK, 1, "a reset other than power-on goes on with the running clock, without waiting for it anew", "chip_clock.c chip_clock_reset") \
+    X(CAPTURE_TIMER_3, 0, "ICTMR of an input capture that takes timer 3; the other takes timer 2", "chip_capture.c capture") \
+    X(CAPTURE_KEEPS_FIRST, 1, "a capture into a full FIFO of four is lost and sets ICOV, but not where every edge is one (ICM 1)", "chip_capture.c capture") \
+    X(CAPTURE_DELAY_CYCLES, 0, "cycles from an edge at the pin to the count that is captured; the same for all edges", "chip_capture.c capture") \
+    X(CAPTURE_OVERFLOW_ENDS, 1, "ICOV is cleared when the FIFO has been read empty, and with ICM 0", "chip_capture.c chip_capture_drop")
 
 enum {
 #define ASSUMPTION_VALUE(id, value, meaning, used_in) ASSUME_##id = (value),

@@ -30,6 +30,7 @@ void chip_reset(chip_t *chip, chip_reset_t cause)
     }
     chip_clock_reset(chip, cause);
     chip_timer_reset(chip);
+    chip_capture_reset(chip);
     chip_uart_reset(chip);
     chip_watchdog_reset(chip);
 }
@@ -37,6 +38,7 @@ void chip_reset(chip_t *chip, chip_reset_t cause)
 /* By chip_event_t. */
 static void (*const on_event[CHIP_EVENTS])(chip_t *) = {
     chip_clock_event, chip_watchdog_event, chip_timer_1, chip_timer_2, chip_timer_3, chip_uart_sent, chip_uart_received,
+    chip_capture_signals,
 };
 
 bool chip_connect(chip_t *chip, const chip_cpu_t *cpu, const chip_board_t *board, plant_t *plant)
@@ -65,6 +67,7 @@ bool chip_connect(chip_t *chip, const chip_cpu_t *cpu, const chip_board_t *board
     chip_watchdog_hooks(chip);
     chip_ports_hooks(chip);
     chip_timer_hooks(chip);
+    chip_capture_hooks(chip);
     chip_uart_hooks(chip);
     return true;
 }
@@ -73,6 +76,7 @@ void chip_end(chip_t *chip)
 {
     chip_uart_wake(chip);
     chip_happen(chip);
+    chip_capture_follow(chip);
     chip_pwm_end(chip);
     chip_adc_end(chip);
 }

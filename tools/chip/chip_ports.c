@@ -2,7 +2,7 @@
 #include "chip.h"
 
 static const uint16_t port_address[3] = {SFR_PORTA, SFR_PORTB, SFR_PORTC};
-enum { TRIS_BEFORE = 2, LAT_BEHIND = 2, RP_VSS = 31 }; /* TRISx, PORTx and LATx follow each other; RPINRx = 31 ties an input to ground */
+enum { TRIS_BEFORE = 2, LAT_BEHIND = 2, RP_VSS = 31, RP_PINS = 26 }; /* TRISx, PORTx and LATx follow each other; RPINRx = 31 ties an input to ground */
 
 static unsigned port_of(uint16_t address)
 {
@@ -54,6 +54,13 @@ unsigned chip_ports_pin(const chip_t *chip, unsigned port, unsigned bit)
     return (input != 0 ? (unsigned)level[port] : chip_get(chip, port_address[port] + LAT_BEHIND)) >> bit & 1u;
 }
 
+/* Level that a peripheral reads at RPn: RP0 to 15 are port B, the others port C. An analogue pin, ground and what does not exist read low. */
+bool chip_ports_rp(const chip_t *chip, unsigned rp)
+{
+    unsigned port = rp < 16 ? 1u : 2u, bit = rp % 16u;
+    return rp < RP_PINS && (analogue_pins(chip, port) >> bit & 1u) == 0 && chip_ports_pin(chip, port, bit) != 0;
+}
+
 /* False where the firmware leaves the fault input alone on purpose: no pin, and no pair follows it. */
 bool chip_ports_fault_used(chip_t *chip)
 {
@@ -68,10 +75,7 @@ bool chip_ports_fault(chip_t *chip)
         chip_warn(chip, "RPINR12: FLTA1R is %u, the board's fault signal is on RP%u%s", rp, chip->board.fault_rp,
                   rp == RP_VSS ? "; tied to ground the input is always active" : "");
     }
-    if (rp < 16) {
-        return chip_ports_pin(chip, 1, rp) == 0;
-    }
-    return rp < 26 ? chip_ports_pin(chip, 2, rp - 16u) == 0 : rp == RP_VSS;
+    return (rp < RP_PINS || rp == RP_VSS) && !chip_ports_rp(chip, rp);
 }
 
 static uint16_t read_port(void *context, uint16_t address)

@@ -36,15 +36,25 @@ static uint32_t counts_to_match(const chip_t *chip, unsigned n)
     return count <= period ? period - count + 1u : 0x10000u - count + period + 1u;
 }
 
-static uint32_t count_now(const chip_t *chip, unsigned n)
+static uint32_t count_at(const chip_t *chip, unsigned n, uint64_t cycle)
 {
     const chip_timer_t *t = &chip->timer[n];
-    if (!t->counts) {
+    if (!t->counts || cycle <= t->base_cycle) {
         return t->base_count;
     }
-    uint64_t passed = (chip_now(chip) - t->base_cycle) / prescale(chip, n);
+    uint64_t passed = (cycle - t->base_cycle) / prescale(chip, n);
     uint32_t match = counts_to_match(chip, n);
     return passed < match ? (t->base_count + (uint32_t)passed) & 0xFFFFu : (uint32_t)((passed - match) % (chip_get(chip, place[n].pr) + 1u));
+}
+
+static uint32_t count_now(const chip_t *chip, unsigned n)
+{
+    return count_at(chip, n, chip_now(chip));
+}
+
+uint16_t chip_timer_count(const chip_t *chip, unsigned n, uint64_t cycle)
+{
+    return (uint16_t)count_at(chip, n, cycle);
 }
 
 static void schedule(chip_t *chip, unsigned n)

@@ -13,7 +13,7 @@ CRYSTAL = ("RA2", "RA3")
 CONVERTED = ("current_a", "current_b", "bus")
 """Sampled at once, in this order, on the converter's channels 1 to 3."""
 PWM = {"pwm_a": "PWM1H1", "pwm_b": "PWM1H2", "pwm_c": "PWM1H3"}
-REMAPPED = ("fault", "uart_tx", "uart_rx")
+REMAPPED = ("fault", "uart_tx", "uart_rx", "pulse")
 
 
 @dataclass(frozen=True)

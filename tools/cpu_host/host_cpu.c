@@ -20,7 +20,7 @@ HANDLERS(DECLARE_WEAK)
 /* Registers whose writes mean more than storing. Nothing tells of a write here: after each piece of firmware they are looked through. */
 static const uint16_t watched[] = {
     SFR_TMR1, SFR_PR1, SFR_T1CON, SFR_TMR2, SFR_PR2, SFR_T2CON, SFR_TMR3, SFR_PR3, SFR_T3CON,
-    SFR_U1MODE, SFR_U1STA, SFR_PORTA, SFR_PORTB, SFR_PORTC,
+    SFR_IC1CON, SFR_IC2CON, SFR_IC7CON, SFR_IC8CON, SFR_U1MODE, SFR_U1STA, SFR_PORTA, SFR_PORTB, SFR_PORTC,
 };
 enum { WATCHED = (int)(sizeof watched / sizeof watched[0]) };
 
@@ -31,6 +31,7 @@ typedef struct {
     volatile uint16_t *place[WATCHED];
     uint16_t before[WATCHED];
     bool offered; /* a received character stands in U1RXREG */
+    unsigned offered_captures; /* by input: one stands in ICxBUF */
     bool stuck;   /* a handler leaves its flag set: the main loop stands still */
 } host_t;
 
@@ -50,25 +51,34 @@ static void show_registers(host_t *h)
     if (h->offered) {
         U1RXREG = chip->uart.rx[0];
     }
+    h->offered_captures = chip_capture_show(chip);
     for (unsigned n = 0; n < WATCHED; n++) {
         h->before[n] = *h->place[n];
     }
 }
 
-/* What the firmware has written. A character that was offered counts as read where the handler or the main loop had the chance. */
-static void follow_writes(host_t *h, bool reads_receiver)
+/* What the firmware has written. A character that was offered counts as read where the handler or the main loop had the chance, and so does a capture. */
+static void follow_writes(host_t *h, bool reads_receiver, bool reads_captures)
 {
     chip_t *chip = h->chip;
     for (unsigned n = 0; n < WATCHED; n++) {
         uint16_t now = *h->place[n];
         if (now != h->before[n]) {
             *h->place[n] = h->before[n];
+            if (chip_capture_is_control(watched[n])) {
+                chip_write(chip, watched[n], 0, 0xFFFF); /* off and on again: nothing else clears ICBNE */
+            }
             chip_write(chip, watched[n], now, 0xFFFF);
         }
     }
     if (h->offered && reads_receiver) {
         (void)chip_read(chip, SFR_U1RXREG);
         h->offered = false;
+    }
+    for (unsigned n = 0; reads_captures && n < CHIP_CAPTURES; n++) {
+        if ((h->offered_captures >> n & 1u) != 0) {
+            chip_capture_drop(chip, n);
+        }
     }
     uint16_t sent = U1TXREG;
     if (sent != HOST_U1TXREG_EMPTY) {
@@ -118,7 +128,7 @@ static void serve(host_t *h, unsigned irq)
                   handler->name, handler->flag);
         h->stuck = true;
     }
-    follow_writes(h, irq == CHIP_IRQ_U1RX);
+    follow_writes(h, irq == CHIP_IRQ_U1RX, false);
 }
 
 static unsigned level(void)
@@ -200,7 +210,7 @@ static int host_reset(void *context)
     host_registers_reset();
     show_registers(h);
     firmware_init();
-    follow_writes(h, false);
+    follow_writes(h, false, false);
     return 0;
 }
 
@@ -216,7 +226,7 @@ static void host_end(void *context, double length_s)
         h->background_countdown = vb_background_periods(h->vb);
         show_registers(h);
         firmware_background();
-        follow_writes(h, true);
+        follow_writes(h, true, true);
     }
 }
 

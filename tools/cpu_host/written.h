@@ -1,27 +1,30 @@
 /* What the self-test REGISTERS compares, for the tools: the end of the PC's unit of the firmware, behind firmware/board/selftest_run.c. The
- * image has none of it. tools/bench/selftest.py reads the registers' names from the firmware's source, in this order. */
+ * image has none of it. */
 #ifndef WRITTEN_H
 #define WRITTEN_H
 
 #include <stdint.h>
+#include <xc.h>
 
-/* Mask and value of a row of the self-test's table: 0, or -1 behind its end and in a build with SELFTEST_OFF. */
-int probe_written(unsigned row, uint16_t *mask, uint16_t *value);
+/* Register, mask and value of a row of the self-test's table: its name, or NULL behind its end and in a build with SELFTEST_OFF. */
+const char *probe_written(unsigned row, uint16_t *mask, uint16_t *value);
 
-int probe_written(unsigned row, uint16_t *mask, uint16_t *value)
+const char *probe_written(unsigned row, uint16_t *mask, uint16_t *value)
 {
 #ifndef SELFTEST_OFF
-    if (row < sizeof written / sizeof written[0]) {
-        *mask = written[row].mask;
-        *value = written[row].value;
-        return 0;
+    for (size_t n = 0; n < host_sfr_count && row < sizeof written / sizeof written[0]; n++) {
+        if (host_sfr_table[n].pointer == written[row].place) {
+            *mask = written[row].mask;
+            *value = written[row].value;
+            return host_sfr_table[n].name;
+        }
     }
 #else
     (void)row;
     (void)mask;
     (void)value;
 #endif
-    return -1;
+    return NULL;
 }
 
 #endif

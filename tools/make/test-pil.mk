@@ -2,5 +2,5 @@
 pil_suites := $(addprefix cpu_33f/test_,peripherals lock_step selftest_image)
 all_suites += $(pil_suites)
 
-# The late application has no test without the compiler: make test-image.
-$(addprefix $T/made/,$(pil_suites) cpu_33f/test_late_application): $B/libpil.so
+# The late application and the measured pulses have no test without the compiler: make test-image.
+$(addprefix $T/made/,$(pil_suites) cpu_33f/test_late_application cpu_33f/test_pulse_image): $B/libpil.so

@@ -73,6 +73,7 @@ int vb_power_up(vb_t *vb)
     memset(&vb->chip.fault, 0, sizeof vb->chip.fault);
     vb->controls.comparator = false;
     vb->controls.trips = 0.0;
+    vb->pulse.runs = false;
     plant_inverter_reset(&vb->plant);
     vb->plant.motor.torque_nm = 0.0; /* of currents that are gone */
     vb->plant.supply.bus_v = vb->plant.supply.voltage_v;

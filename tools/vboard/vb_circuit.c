@@ -6,7 +6,7 @@
 #define REFERENCE_V 3.3
 #define ZERO_C_K 273.15
 
-enum { FLTA_RP = 8, LED_PORT = 2, LED_BIT = 6, LEDS = 2 }; /* FLTA1 is on RB8, the LEDs on RC6 and RC7 */
+enum { FLTA_RP = 8, PULSE_RP = 7, LED_PORT = 2, LED_BIT = 6, LEDS = 2 }; /* FLTA1 is on RB8, the pulses on RB7, the LEDs on RC6 and RC7 */
 /* The direction input is RA4, CN0; the outputs of a product are on port A, each with a pull-down before its switch. */
 enum { DIRECTION_BIT = 4, DIRECTION_CN = 0 };
 static const unsigned switch_bit[] = { [VB_FAULT_RELAY] = 7, [VB_RUNNING_RELAY] = 10, [VB_BRAKE] = 9 };
@@ -52,7 +52,7 @@ static void levels(void *context, uint16_t level[3])
 {
     const vb_t *vb = context;
     level[0] = (uint16_t)(0x079Fu & ~(button(vb, 0) ? 1u << 8 : 0u) & ~(direction_is_low(vb) ? 1u << DIRECTION_BIT : 0u));
-    level[1] = (uint16_t)(0xFFFFu & ~(button(vb, 1) ? 1u << 4 : 0u) & ~(fault_is_low(vb) ? 1u << FLTA_RP : 0u));
+    level[1] = (uint16_t)(0xFFFFu & ~(button(vb, 1) ? 1u << 4 : 0u) & ~(fault_is_low(vb) ? 1u << FLTA_RP : 0u) & ~(vb_pulse_pin(vb) ? 0u : 1u << PULSE_RP));
     level[2] = 0x03FFu;
 }
 
@@ -147,7 +147,8 @@ static void warn(void *context, const char *format, va_list args)
 }
 
 const chip_board_t vb_circuit = {
-    .levels = levels, .input_v = input_voltage, .sampled = sampled, .served = vb_served, .send = vb_serial_send,
+    .levels = levels, .input_v = input_voltage, .sampled = sampled, .served = vb_served, .signals = vb_pulse_signals, .send = vb_serial_send,
     .receive = vb_serial_receive, .warn = warn,
-    .fault_rp = FLTA_RP, .channel = {{8, "the potentiometer", 1u << MOTOR_NTC_AN | 1u << BRIDGE_NTC_AN}, {0, "IA", 0}, {1, "IB", 0}, {2, "VBUS", 0}},
+    .fault_rp = FLTA_RP, .capture_rp = PULSE_RP,
+    .channel = {{8, "the potentiometer", 1u << MOTOR_NTC_AN | 1u << BRIDGE_NTC_AN}, {0, "IA", 0}, {1, "IB", 0}, {2, "VBUS", 0}},
 };

@@ -15,6 +15,14 @@ typedef struct {
     double trips;
 } vb_controls_t;
 
+/* The pulses at the command input (vb_pulse.c). Times since power-on. */
+typedef struct {
+    double hz, us, duty, jitter_us, odd, odd_us, stuck, inverted;
+    double fall_s, rise_s; /* the end of the pulse that has begun, and the begin of the next one */
+    bool runs, level;
+    uint64_t rng;
+} vb_pulse_t;
+
 /* What may be connected wrongly on the way to a pin (vb_circuit.c); motor wires and drivers are the plant's. */
 typedef struct {
     double currents;  /* 1: the current channels have changed places */
@@ -89,6 +97,7 @@ struct vb {
     chip_t chip;
     plant_t plant;
     vb_controls_t controls;
+    vb_pulse_t pulse;
     vb_wiring_t wiring;
     vb_analogue_t analogue;
     vb_serial_t serial;
@@ -126,6 +135,10 @@ void vb_circuit_comparator(vb_t *vb, bool period_start);
 double vb_circuit_led(const vb_t *vb, unsigned led);
 enum { VB_FAULT_RELAY, VB_RUNNING_RELAY, VB_BRAKE }; /* switches behind the outputs of a product, which a pin closes while it drives high */
 bool vb_circuit_switch(const vb_t *vb, unsigned number);
+
+/* vb_pulse.c */
+double vb_pulse_signals(void *vb, double now_s);
+bool vb_pulse_pin(const vb_t *vb);
 
 /* vb_serial.c */
 void vb_serial_send(void *vb, uint8_t character);
