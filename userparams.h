@@ -178,6 +178,9 @@
 #ifndef SCOPE /* or build with -DSCOPE=1 */
 #define SCOPE 0                     /* [switch]        0 .. 1         1: the serial line answers X2C-Scope clients, their trace buffer takes the fault recorder's place; 0: status line only */
 #endif
+#ifndef PARAMS_KEPT /* or build with -DPARAMS_KEPT=1 */
+#define PARAMS_KEPT 0               /* [switch]        0 .. 1         1: with PARAMS_IN_RAM parameters can be kept over a reset, in two pages of flash (docs/kept.md); 0: not */
+#endif
 
 /* ---- Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it - */
 #define RETRY_COUNT 0               /* [times]         0 .. 20        retries before a fault stays; 0: never, appliances usually have 3 */

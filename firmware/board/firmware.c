@@ -3,6 +3,7 @@
 
 #include "board/app_calls.h"
 #include "board/application.h"
+#include "board/kept.h"
 #include "board/mclv.h"
 #include "board/modes/mode_board.h"
 #include "board/peripherals.h"
@@ -66,6 +67,7 @@ void firmware_init(void)
     drive_zero(&judged, sizeof judged);
     CORCON = 0x0024u; /* fractional, unsaturated: the control law's products do not depend on it; PSV on: tables are read from flash */
     INTCON1bits.NSTDIS = 0;
+    kept_init();
     application_init();
     request_init(&board_request);
     mode_panel_init();
@@ -210,6 +212,7 @@ void firmware_background(void)
         firmware_judge(elapsed_ms);
         selftest_part(SELFTEST_PART_WATCH);
         status_tick(elapsed_ms);
+        kept_tick(elapsed_ms);
         selftest_part(SELFTEST_PART_STATUS);
         selftest_ms();
         firmware_turn_input();

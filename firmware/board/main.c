@@ -2,7 +2,8 @@
 #include "board/firmware.h"
 #include "board/selftest_cpu.h"
 
-/* Start on FRC, crystal and PLL by software, PWM pins inactive at reset, watchdog on: 32 kHz / 32 / 16, 16 ms. */
+/* Start on FRC, crystal and PLL by software, PWM pins inactive at reset, watchdog on: 32 kHz / 32 / 16, 16 ms.
+ * With PARAMS_KEPT 64 ms: a page is erased in 27 ms at most [?], and the self-test of a start lets 48 ms pass. */
 #ifdef __XC16__
 #pragma config FNOSC = FRC
 #pragma config IESO = OFF
@@ -13,7 +14,11 @@
 #pragma config FWDTEN = ON
 #pragma config WINDIS = OFF
 #pragma config WDTPRE = PR32
+#if PARAMS_KEPT
+#pragma config WDTPOST = PS64
+#else
 #pragma config WDTPOST = PS16
+#endif
 #pragma config FPWRT = PWR128
 #pragma config PWMPIN = ON
 #pragma config HPOL = ON

@@ -2,6 +2,7 @@
 #include "board/status.h"
 
 #include "board/app_calls.h"
+#include "board/kept.h"
 #include "board/scope.h"
 #include "board/modes/mode_board.h"
 #include "board/peripherals.h"
@@ -101,7 +102,7 @@ static char *put_line(void)
         at = text_put_named(at, "state ", (int16_t)board_drive.state);
         at = text_put_fault(at, " fault ", board_drive.fault);
         at = text_put_named(at, " speed ", status_rpm(estimator_speed(&board_drive.run.estimator)));
-        at = put_limits(put_retry(put_heat(text_put(at, " rpm"))));
+        at = put_limits(put_retry(put_heat(kept_put(text_put(at, " rpm")))));
         at = text_end(selftest_put(at));
     }
     return at;

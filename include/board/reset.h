@@ -53,7 +53,7 @@ drive_fault_t reset_take(void);
 void reset_keep(uint16_t fault);
 
 /** Serves the watchdog if a control interrupt came since the last call; the caller shows that the background is alive. Nothing else serves
- *  it after the start: when either stands still, the reset comes 16 ms later. @param ticks of the drive */
+ *  it after the start, but what programs the flash (kept.c): when either stands still, the reset comes 16 ms later, with PARAMS_KEPT 64. @param ticks of the drive */
 void reset_serve_watchdog(uint16_t ticks);
 
 #endif

@@ -5,7 +5,8 @@
 #include "board/firmware.h"
 #include "board/mclv.h"
 
-#define BOARD_FLASH_CRC_AT 0x57FCu /* the last two words of the flash: CRC of all before them, and its complement; tools/image/crc.py writes them */
+/** Two words: CRC of the flash before them, and its complement; tools/image/crc.py writes them. Behind them are the kept parameters' pages, or nothing. */
+#define BOARD_FLASH_CRC_AT ((PARAMS_KEPT) ? 0x4FFCu : 0x57FCu)
 #define STACK_GUARD (BOARD_STACK_LIMIT - 2)
 #define STACK_PATTERN 0xA5C3u
 

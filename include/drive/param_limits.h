@@ -95,7 +95,8 @@
     X(RECORDER_PERIODS, "periods", 0, 64, 4, "one row every RECORDER_PERIODS periods, a power of two; 0: no recorder")
 
 #define PARAM_SCOPE(X) /* Scope: watch, record and tune by the serial line (docs/scope.md) */ \
-    X(SCOPE, "switch", 0, 1, 0, "1: the serial line answers X2C-Scope clients, their trace buffer takes the fault recorder's place; 0: status line only")
+    X(SCOPE, "switch", 0, 1, 0, "1: the serial line answers X2C-Scope clients, their trace buffer takes the fault recorder's place; 0: status line only") \
+    X(PARAMS_KEPT, "switch", 0, 1, 0, "1: with PARAMS_IN_RAM parameters can be kept over a reset, in two pages of flash (docs/kept.md); 0: not")
 
 #define PARAM_RETRY(X) /* Retry: a run that a passing fault has ended starts again by itself. Only where nobody can come to harm by it */ \
     X(RETRY_COUNT, "times", 0, 20, 0, "retries before a fault stays; 0: never, appliances usually have 3") \

@@ -56,6 +56,20 @@ def character(mode: int = 0x8008) -> str:
             f"mov tmr1, w0; mov w0, {RAM}\n")
 
 
+PLACE = 0x5000
+LATCH = "mov #{at}, w1; mov #{low}, w0; tblwtl w0, [w1]; mov #{high}, w0; tblwth w0, [w1]\n"
+KEY = "mov w2, nvmkey; mov w3, nvmkey; bset nvmcon, #15; nop; nop\n"
+READ = f"mov #{PLACE}, w1; tblrdl [w1], w0; mov w0, {RAM}; tblrdh [w1], w0; mov w0, {RAM + 2}; mov nvmcon, w0; mov w0, {RAM + 4}\n"
+
+
+def flash(operation: int, key: str = KEY, at: int = PLACE, low: int = 0x1234, high: int = 0x56) -> str:
+    """A word into its latch, and an operation of the flash."""
+    return f"clr 0x32; mov #0x55, w2; mov #0xAA, w3; {LATCH.format(at=at, low=low, high=high)} mov #{operation}, w0; mov w0, nvmcon; {key}"
+
+
+WORD, ROW, ERASE = 0x4003, 0x4001, 0x4042
+NOTHING = {RAM: 0xFFFF, RAM + 2: 0xFF, WARNED: "nothing is written"}
+
 # Name, program, milliseconds and configuration words, what it leaves: registers, keys and words of RAM, as (mask, value) or a value.
 CASES = [
     ("the clock starts on the fast RC oscillator", "", {"ms": 1},
@@ -92,6 +106,23 @@ CASES = [
        {RAM: (0xF, low)})
       for pins, low in ((0, 0), (0x1FF, 0xF))),
     ("port: written, it is the latch", "bclr trisc, #6; bset portc, #6\n", {}, {"pin.RC6": 1, WARNED: "PORTC:"}),
+    ("flash: a word", flash(WORD) + READ, {}, {RAM: 0x1234, RAM + 2: 0x56, RAM + 4: 0x4003}),
+    ("flash: programming only clears bits", flash(WORD) + flash(WORD, low=0xFF0F, high=0xF0) + READ, {}, {RAM: 0x1204, RAM + 2: 0x50}),
+    ("flash: a row has the words of its table writes", f"clr 0x32; {LATCH.format(at=PLACE + 126, low=1, high=2)}" + flash(ROW) + READ.replace(str(PLACE), str(PLACE + 126)), {},
+     {RAM: 1, RAM + 2: 2}),
+    ("flash: a word is not the row", flash(WORD, at=PLACE + 2) + READ, {}, {RAM: 0xFFFF, RAM + 2: 0xFF}),
+    ("flash: a page is erased", flash(WORD) + flash(ERASE, at=PLACE + 0x3FE) + READ, {"ms": 60}, {RAM: 0xFFFF, RAM + 2: 0xFF, RAM + 4: 0x4042}),
+    ("flash: the next page is not", flash(WORD) + flash(ERASE, at=PLACE + 0x400) + READ, {"ms": 60}, {RAM: 0x1234, RAM + 2: 0x56}),
+    *((f"flash: the processor stands, {us} us", PLL + TIMER.replace("0x8000", "0x8030") + flash(operation) + f"mov tmr1, w0; mov w0, {RAM}\n", {"ms": 60},
+       {RAM: approx(us * 40 / 256, abs=1)}) for operation, us in ((WORD, 56), (ROW, 1740), (ERASE, 26500))),
+    ("flash: nothing without the keys", flash(WORD, "bset nvmcon, #15\n") + READ, {}, NOTHING | {RAM + 4: 0x6003}),
+    ("flash: nothing with the second key alone", flash(WORD, KEY.replace("mov w2, nvmkey;", "")) + READ, {}, NOTHING),
+    ("flash: nothing with the keys in the other order", flash(WORD, KEY.replace("w2", "w4").replace("w3", "w2").replace("w4", "w3")) + READ, {}, NOTHING),
+    ("flash: nothing too long after the keys", flash(WORD, KEY.replace("bset", "nop; nop; bset", 1)) + READ, {}, NOTHING),
+    ("flash: nothing without WREN", flash(WORD & 0x3FFF) + READ, {}, NOTHING),
+    ("flash: the keys are good for once", flash(WORD) + "bset nvmcon, #15\n" + READ, {}, {RAM: 0x1234, WARNED: "nothing is written"}),
+    ("flash: an operation that there is not", flash(0x4004) + READ, {}, {RAM: 0xFFFF, WARNED: "0xC004 is no operation"}),
+    ("flash: it outlives a reset", f"btsc rcon, #6\nbra done\n" + flash(WORD) + "reset\ndone:\n" + READ, {}, {RAM: 0x1234, "cpu.resets": 1, "cpu.flash_operations": 1}),
     ("timer: instruction cycles", timer_after(0, 98), {}, {RAM: 101}), # REPEAT, 99 NOPs, MOV: the write of T1CON ends before the first
     *((f"timer: prescaler 1:{cycles}", timer_after(bits, 5117), {}, {RAM: approx(5120 / cycles, abs=1)})
       for bits, cycles in ((0, 1), (1, 8), (2, 64), (3, 256))),

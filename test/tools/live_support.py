@@ -21,6 +21,15 @@ def parts() -> board.Parts:
     return board.parts()
 
 
+KEPT_DEFINES = "-DPARAMS_IN_RAM -DPARAMS_KEPT=1"
+
+
+@functools.cache
+def kept_parts() -> board.Parts:
+    """The firmware with its scope and parameters that can be kept."""
+    return board.parts(defines=KEPT_DEFINES)
+
+
 @functools.cache
 def known() -> symbols.Symbols:
     """Its variables."""
@@ -91,8 +100,8 @@ class Living:
 class Served:
     """A running server. `url` is what it has printed."""
 
-    def __init__(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "tools.live", "--library", str(parts().library.path), "--listen", "0", *arguments]
+    def __init__(self, *arguments: str, made_of: board.Parts | None = None) -> None:
+        command = [sys.executable, "-m", "tools.live", "--library", str((made_of or parts()).library.path), "--listen", "0", *arguments]
         self.process = subprocess.Popen(command, cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         first = self.process.stdout.readline()
         assert first.startswith("open http://127.0.0.1:"), first + self.process.stderr.read()
@@ -107,8 +116,8 @@ class Served:
 
 
 @contextlib.contextmanager
-def served(*arguments: str) -> Iterator[Served]:
-    server = Served(*arguments)
+def served(*arguments: str, made_of: board.Parts | None = None) -> Iterator[Served]:
+    server = Served(*arguments, made_of=made_of)
     try:
         yield server
     finally:

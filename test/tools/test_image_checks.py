@@ -198,10 +198,12 @@ def test_the_table_names_every_field_with_its_meaning_and_bits_that_mean_nothing
 
 
 def test_the_projects_own_settings_are_all_known_and_what_the_board_needs():
-    config = image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8"))
-    assert len(config) > 10
-    for name, value in config.items():
-        assert value in device.FIELDS[name].values and value == device.BOARD_NEEDS.get(name, value), name
+    text = image.CONFIG_C.read_text(encoding="utf-8")
+    for keeps, needs in ((False, device.BOARD_NEEDS), (True, device.KEPT_NEEDS)):
+        config = image.wanted_fields(text, keeps)
+        assert len(config) > 10 and config["WDTPOST"] == ("PS64" if keeps else "PS16")
+        for name, value in config.items():
+            assert value in device.FIELDS[name].values and value == needs.get(name, value), name
 
 
 # ---- the compiler's library ----------------------------------------------------------------------------------------------

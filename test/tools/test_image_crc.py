@@ -1,7 +1,7 @@
 """The flash's CRC: computed as the chip does, written into its place in the ELF file, and missed where it cannot be."""
 
 import pytest
-from sample_image import END, good_image
+from sample_image import END, EXECUTE, Section, good_image
 from support import command
 
 from tools.image import crc, device, image
@@ -95,3 +95,43 @@ def test_a_file_that_is_no_program_is_one_line(tmp_path, content: bytes | None) 
         (tmp_path / "a.elf").write_bytes(content)
     status, _, error = command(str(tmp_path / "a.elf"), main=crc.main)
     assert status == 2 and error.count("\n") == 1 and "a.elf" in error
+
+
+# ---- with PARAMS_KEPT: two pages that stay erased, and the CRC before them -----------------------------------------------------
+KEPT_PLACE, NOT_LOADED = 0x4FFC, 0x00800000
+
+
+def with_kept_pages(place: int = KEPT_PLACE):
+    sample = with_self_tests(place)
+    sample.sections.append(Section("pages", 0x5000, bytes(4096), EXECUTE | NOT_LOADED, names=[("_board_kept_pages", 0x5000, 0x800)]))
+    sample.words[device.FIELDS["WDTPOST"].word] = sample.words[device.FIELDS["WDTPOST"].word] & ~0x0F | 6 # PS64
+    return sample
+
+
+def test_with_kept_parameters_the_crc_is_before_their_pages_and_of_what_is_before_it(tmp_path) -> None:
+    arguments = write(with_kept_pages(), tmp_path)
+    words = read_elf(tmp_path / "a.elf").words
+    value = crc.crc(words, KEPT_PLACE)
+    assert (words[KEPT_PLACE], words[KEPT_PLACE + 2]) == (value, value ^ 0xFFFF) and value == crc.crc(words | {KEPT_PLACE: 1}, KEPT_PLACE)
+    assert not [address for address in words if address in device.KEPT], "what is not loaded is no content"
+    sample = with_kept_pages()
+    sample.words |= {address: words[address] for address in (KEPT_PLACE, KEPT_PLACE + 2)}
+    status, out, error = command(*sample.write(tmp_path), main=image.main)
+    assert status == 0 and "3072 more for kept parameters" in out, error
+    sample.words[0x206] ^= 4
+    assert "flash's CRC at 0x4FFC" in command(*sample.write(tmp_path), main=image.main)[2]
+    del arguments
+
+
+def test_with_kept_parameters_another_place_of_the_crc_is_refused(tmp_path) -> None:
+    status, _, error = command(with_kept_pages(PLACE).write(tmp_path)[0], main=crc.main)
+    assert status == 2 and "no place for the flash's CRC: board_flash_crc is not at 0x4FFC" in error
+
+
+def test_a_word_in_the_kept_parameters_pages_and_the_usual_watchdog_are_refused(tmp_path) -> None:
+    sample = with_kept_pages()
+    sample.hex_words = {**sample.words, 0x5402: 0x123456}
+    assert "word 0x5402 is in the pages of the kept parameters (0x5000 .. 0x57FE), which must stay erased" in command(*sample.write(tmp_path), main=image.main)[2]
+    sample = with_kept_pages()
+    sample.words[device.FIELDS["WDTPOST"].word] = with_self_tests().words[device.FIELDS["WDTPOST"].word]
+    assert "WDTPOST is PS16 (watchdog / 16), must be PS64 (watchdog / 64)" in command(*sample.write(tmp_path), main=image.main)[2]

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import pytest
-from live_support import served, until
+from live_support import kept_parts, served, until
 from support import document
 
 from tools.bench import scenario_file
@@ -241,3 +241,30 @@ def test_the_browser_found_nothing_to_complain_about(turning):
     page = turning
     own = [entry for entry in page.driver.get_log("browser") if "ERR_CONNECTION_REFUSED" not in entry["message"] and "WebSocket" not in entry["message"]]
     assert own == [] and page.run("return performance.getEntriesByType('resource').filter((e) => !e.name.startsWith(location.origin)).length") == 0
+
+
+# ---- kept parameters ---------------------------------------------------------------------------------------------------------
+def test_without_kept_parameters_nothing_is_said_of_them(page):
+    assert not page.one("#kept-card").is_displayed()
+
+
+def test_parameters_are_kept_and_forgotten_and_the_page_says_so(chromium):
+    with served(made_of=kept_parts()) as running:
+        page = Page(chromium[0], running.url)
+        says = "return document.getElementById('kept-state').textContent === '{}' && !document.getElementById('keep').disabled"
+        page.wait(says.format("NONE"), "not NONE")
+        assert page.one("#kept-card").is_displayed() and page.text("#kept-text") == "nothing is kept: the header's values are in use"
+        page.click("#keep")
+        page.wait(says.format("KEPT"), "not KEPT")
+        assert "keep: done" in page.text("#log")
+        page.click("[data-button=S2]")
+        page.state("CLOSED")
+        assert not page.one("#keep").is_enabled() and not page.one("#forget").is_enabled()
+        page.click("[data-button=S2]")
+        page.state("STOPPED")
+        page.click("#forget")
+        page.wait(says.format("NONE"), "not NONE again")
+        for unsaved, part in ((0, "no copy is whole"), (1, "; 1 word has changed"), (12, "; 12 words have changed")):
+            page.run("window.eval(`views.all.find((view) => view instanceof KeptView).show({ state: 'STOPPED', kept: { state: 'BROKEN', "
+                     f"meaning: 'no copy is whole', unsaved: {unsaved} }} }})`)")
+            assert part in page.text("#kept-text") and "bad" in page.one("#kept-state").get_attribute("class")

@@ -41,6 +41,7 @@ enum { CHIP_FBS = 0, CHIP_FGS = 2, CHIP_FOSCSEL = 3, CHIP_FOSC = 4, CHIP_FWDT = 
  *   wake           the watchdog's time is over: true if that has woken it from sleep
  *   begin, end     a PWM period starts (NULL: of no concern), is over
  *   run            go on to `until_s`, or to an instant before at which the board must follow; returns it. NULL: handlers take no time
+ *   flash          erase the page, or program the row or word, of the last table write, and stand for so many cycles; NULL: nothing is programmed
  *   follow         the plant has reached the time that run() returned
  *   destroy        the board is going away */
 typedef struct {
@@ -53,6 +54,7 @@ typedef struct {
     bool (*raised)(void *context, unsigned irq);
     void (*attend)(void *context);
     void (*clock)(void *context);
+    void (*flash)(void *context, bool erases, unsigned words, uint64_t cycles);
     bool (*wake)(void *context);
     void (*begin)(void *context);
     double (*run)(void *context, double until_s);
@@ -112,6 +114,14 @@ typedef struct {
     bool locked_once;               /* IOLOCK has been set since the reset (IOL1WAY) */
     double expected_fcy_hz;         /* no cause for a warning, 0 = any */
 } chip_clock_t;
+
+/* Self-programming (chip_nvm.c). */
+typedef struct {
+    unsigned step;       /* how far the unlock sequence has come */
+    uint64_t cycle;      /* of its last write */
+    double standing_s;   /* left of the time that the processor stands: nobody can serve an interrupt */
+    double operations;   /* carried out so far */
+} chip_nvm_t;
 
 typedef struct {
     uint64_t base_cycle; /* the count was base_count then */
@@ -233,6 +243,7 @@ struct chip {
     unsigned resets;             /* other than the first */
     double watchdog_end_s;
     chip_clock_t clock;
+    chip_nvm_t nvm;
     chip_timer_t timer[CHIP_TIMERS];
     chip_capture_t capture[CHIP_CAPTURES];
     uint64_t signals_cycle;      /* when a level changes next */
@@ -320,6 +331,9 @@ void chip_clock_event(chip_t *chip);
 void chip_clock_follow(chip_t *chip);
 void chip_clock_check(chip_t *chip);
 bool chip_clock_pins_locked(const chip_t *chip);
+
+/* chip_nvm.c */
+void chip_nvm_hooks(chip_t *chip);
 
 /* chip_watchdog.c */
 void chip_watchdog_hooks(chip_t *chip);

@@ -297,7 +297,7 @@ void chip_adc_trigger(chip_t *chip)
 static void interrupt(chip_t *chip)
 {
     bool to_come = false;
-    if ((CHIP_REG(chip, IFS0) & AD1IF) != 0) {
+    if ((CHIP_REG(chip, IFS0) & AD1IF) != 0 && chip->nvm.standing_s <= 0.0) {
         chip->adc.overruns += 1.0;
         chip_warn(chip, "IFS0: AD1IF is still set when the next conversion ends, the handler was late or never came");
     }

@@ -64,6 +64,7 @@ bool chip_connect(chip_t *chip, const chip_cpu_t *cpu, const chip_board_t *board
     chip->clock.fcy_hz = 0.5 * chip->clock.frc_hz;
     chip->adc.due_s = PLANT_NEVER;
     chip_clock_hooks(chip);
+    chip_nvm_hooks(chip);
     chip_watchdog_hooks(chip);
     chip_ports_hooks(chip);
     chip_timer_hooks(chip);
@@ -79,4 +80,5 @@ void chip_end(chip_t *chip)
     chip_capture_follow(chip);
     chip_pwm_end(chip);
     chip_adc_end(chip);
+    chip->nvm.standing_s = plant_max(chip->nvm.standing_s - chip->pwm.length_s, 0.0);
 }

@@ -16,7 +16,7 @@ ENTRIES = 18
 FOLLOWS = {"FROM_MOTOR": "motor file", "FROM_BOARD": "board file", "FROM_TUNER": "tuner"}
 """Defaults that are no number: what the value follows from."""
 FROM_DEFINES = ("SCOPE", "DIRECTION_INPUT_USED", "FAULT_OUTPUT_USED", "RUNNING_OUTPUT_USED", "BRAKE_CHOPPER_V", "BRAKE_CHOPPER_SHARE", "BRAKE_CHOPPER_SEC",
-                "MOTOR_NTC_USED", "BRIDGE_NTC_USED")
+                "MOTOR_NTC_USED", "BRIDGE_NTC_USED", "PARAMS_KEPT")
 """Parameters that DEFINES may set instead of userparams.h, which asks about them."""
 _GROUP = re.compile(r"#define PARAM_\w+\(X\) /\* (.+?) \*/(.*)")
 _ROW = re.compile(r'(PARAM_ENTRIES\(X, |X\()(\w+), "([^"]*)", ([^,()]+), ([^,()]+), ([^,()]+), "([^"]*)"\)')

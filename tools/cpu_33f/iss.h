@@ -69,6 +69,10 @@ void iss_reset(iss_t *iss, chip_reset_t cause);
 uint32_t *iss_program(iss_t *iss);
 void iss_program_changed(iss_t *iss);
 
+/* The chip programs it: erases so many words around the last table write, or clears the bits that are 0 in what the table writes have left for
+ * them. The core stands for so many cycles. Words are a power of two. */
+void iss_flash(iss_t *iss, bool erases, unsigned words, uint64_t cycles);
+
 /* Program one word, of flash or of the configuration words; ISS_ERASED erases it. False: there is no such address. */
 bool iss_write_program(iss_t *iss, uint32_t pc, uint32_t word);
 

@@ -34,6 +34,9 @@ static void erase(iss_t *m)
     for (uint32_t n = 0; n < ISS_CONFIG_WORDS; n++) {
         m->config[n] = ISS_ERASED;
     }
+    for (unsigned n = 0; n < ISS_LATCHES; n++) {
+        m->latch[n] = ISS_ERASED;
+    }
     iss_program_changed(m);
 }
 

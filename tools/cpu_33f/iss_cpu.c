@@ -41,6 +41,11 @@ static bool wake(void *context)
     return true;
 }
 
+static void flash(void *context, bool erases, unsigned words, uint64_t cycles_long)
+{
+    iss_flash(((const iss_cpu_t *)context)->iss, erases, words, cycles_long);
+}
+
 /* ---- accesses of the core ---- */
 
 static uint16_t read_counter(void *context, uint16_t address)
@@ -155,6 +160,7 @@ bool iss_cpu_create(iss_cpu_t *cpu, const iss_image_t *image, chip_cpu_t *functi
     functions->raised = raised;
     functions->attend = attend;
     functions->wake = wake;
+    functions->flash = flash;
     return true;
 }
 

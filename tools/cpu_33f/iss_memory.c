@@ -33,6 +33,29 @@ uint32_t iss_table_word(iss_t *m, uint32_t address)
     return ASSUME_OUTSIDE_FLASH_VALUE;
 }
 
+/* The bits of `mask` of a word go to its latch. */
+void iss_table_write(iss_t *m, uint32_t address, uint32_t value, uint32_t mask)
+{
+    uint32_t *latch = &m->latch[address / 2u % ISS_LATCHES];
+    m->latched = address / 2u;
+    *latch = (*latch & ~mask) | (value & mask);
+}
+
+void iss_flash(iss_t *m, bool erases, unsigned words, uint64_t cycles)
+{
+    uint32_t first = m->latched & ~(words - 1u);
+    for (uint32_t index = first; index < first + words; index++) {
+        uint32_t latch = m->latch[index % ISS_LATCHES];
+        if (index < ISS_PROGRAM_WORDS) {
+            (void)iss_write_program(m, 2u * index, erases ? ISS_ERASED : m->program[index] & latch);
+        }
+    }
+    for (unsigned n = 0; n < ISS_LATCHES; n++) {
+        m->latch[n] = ISS_ERASED;
+    }
+    m->cycle += cycles;
+}
+
 static unsigned psv_cycles(iss_t *m)
 {
     bool inner = (m->data[R_SR] & SR_RA) != 0 && m->data[R_RCOUNT] != 0 && !m->repeat_edge;

@@ -162,18 +162,22 @@ static inline uint32_t table_address(const iss_t *m, unsigned pointer)
 TABLE_READ(tblrdl, 0)
 TABLE_READ(tblrdh, 16)
 
-/* Writes go to latches that only programming the flash would read, which is not modelled: the pointers move, nothing else. */
-static void tblwt_w(iss_t *m, const insn_t *i)
-{
-    (void)source(m, i, 16);
-    (void)indirect(m, i->d, i->q, i->w, 2, true);
-}
-
-static void tblwt_b(iss_t *m, const insn_t *i)
-{
-    (void)source(m, i, 8);
-    (void)indirect(m, i->d, i->q, i->w, 1, true);
-}
+#define TABLE_WRITE(name, shift) \
+    static void name##_w(iss_t *m, const insn_t *i) \
+    { \
+        unsigned value = source(m, i, 16); \
+        unsigned pointer = indirect(m, i->d, i->q, i->w, 2, true); \
+        iss_table_write(m, table_address(m, pointer), value << (shift), 0xFFFFu << (shift)); \
+    } \
+    static void name##_b(iss_t *m, const insn_t *i) \
+    { \
+        unsigned value = source(m, i, 8) & 0xFFu; \
+        unsigned pointer = indirect(m, i->d, i->q, i->w, 1, true); \
+        unsigned place = (shift) + 8u * (pointer & 1u); \
+        iss_table_write(m, table_address(m, pointer), value << place, 0xFFu << place); \
+    }
+TABLE_WRITE(tblwtl, 0)
+TABLE_WRITE(tblwth, 16)
 
 const row_t iss_rows_move[] = {
     {"mov", {FILE_WREG}, 0xBF8000, 0xFF8000, W_B(mov_file), .cycles = 1},
@@ -197,7 +201,7 @@ const row_t iss_rows_move[] = {
     {"swap", {WN}, 0xFD8000, 0xFFBFF0, W_B(swap), .cycles = 1},
     {"tblrdl", {IS, MD}, 0xBA0000, 0xFF8000, W_B(tblrdl), .cycles = 2},
     {"tblrdh", {IS, MD}, 0xBA8000, 0xFF8000, W_B(tblrdh), .cycles = 2},
-    {"tblwtl", {MS, ID}, 0xBB0000, 0xFF8000, W_B(tblwt), .cycles = 2},
-    {"tblwth", {MS, ID}, 0xBB8000, 0xFF8000, W_B(tblwt), .cycles = 2},
+    {"tblwtl", {MS, ID}, 0xBB0000, 0xFF8000, W_B(tblwtl), .cycles = 2},
+    {"tblwth", {MS, ID}, 0xBB8000, 0xFF8000, W_B(tblwth), .cycles = 2},
     {0},
 };

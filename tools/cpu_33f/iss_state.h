@@ -121,7 +121,7 @@ enum { CODE_OUTSIDE = ISS_PROGRAM_WORDS }; /* index of the instruction that stan
 
 /* ---- state ---- */
 
-enum { NESTING = 24, ISS_TEXT = 256 };
+enum { NESTING = 24, ISS_TEXT = 256, ISS_LATCHES = 64 };
 
 typedef struct {
     uint16_t (*read)(void *context, uint16_t address);
@@ -184,6 +184,9 @@ struct iss {
     void (*on_leave)(void *, unsigned, uint64_t);
     void *interrupt_context;
 
+    uint32_t latch[ISS_LATCHES]; /* table writes, for the flash's next row */
+    uint32_t latched;            /* index of the last one's word in the flash */
+
     uint32_t config[ISS_CONFIG_WORDS];
     uint8_t sfr_kind[SFR_WORDS];
     sfr_hook_t hook[SFR_WORDS];
@@ -213,6 +216,7 @@ unsigned iss_step_modulo(const iss_t *m, unsigned address, int step, bool y_spac
 uint16_t iss_core_read(iss_t *m, unsigned index);
 void iss_core_write(iss_t *m, unsigned index, unsigned value, unsigned mask);
 uint32_t iss_table_word(iss_t *m, uint32_t address);
+void iss_table_write(iss_t *m, uint32_t address, uint32_t value, uint32_t mask);
 
 /* iss_irq.c */
 void iss_serve(iss_t *m);

@@ -208,6 +208,7 @@ static int host_reset(void *context)
     h->stuck = false;
     chip_reset(h->chip, CHIP_RESET_POR);
     host_registers_reset();
+    probe_power_up();
     show_registers(h);
     firmware_init();
     follow_writes(h, false, false);

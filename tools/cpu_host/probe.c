@@ -2,6 +2,7 @@
 #include "probe.h"
 
 #include "board/firmware.h"
+#include "board/kept.h"
 #include "board/watch.h"
 #include "drive/limits.h"
 #include "drive/param_limits.h"
@@ -207,6 +208,20 @@ int probe_param_set(const char *name, double value)
         }
     }
     return result;
+}
+
+void probe_power_up(void)
+{
+#if PARAMS_KEPT
+    static drive_params_t start_values;
+    static int are_known;
+    if (!are_known) {
+        start_values = board_params;
+        are_known = 1;
+    }
+    board_params = start_values;
+    kept_command = (kept_t){0};
+#endif
 }
 
 const char *probe_fault_name(int code)

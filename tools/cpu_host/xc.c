@@ -1,6 +1,10 @@
 /* Storage, start values and look-up of the host's special function registers. */
 #include "xc.h"
 
+#include <errno.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define HOST_SFR_DEFINE(name, address, start) volatile uint16_t name = (start);
@@ -18,25 +22,101 @@ static const struct { volatile uint16_t *pointer; uint16_t start; } ready[] = {
 
 /* ---- self-tests ---- */
 
+enum { HOST_ERASED = 0xFFFFFF };
 uint32_t host_flash[HOST_FLASH_WORDS];
 volatile uint16_t host_free_ram[HOST_FREE_WORDS], host_stack[HOST_STACK_WORDS];
 uint16_t host_w_stuck_at_1[HOST_W_REGISTERS], host_w_stuck_at_0[HOST_W_REGISTERS];
 uint16_t host_watchdog_counts = 10000;
 
-/* Any words, and as tools/image/crc.py does: CRC-16 of CCITT, bit by bit, over all but the last two. */
-static void fill_flash(void)
+/* As tools/image/crc.py does: CRC-16 of CCITT, bit by bit, over all before its place. */
+static void put_crc(uint32_t place)
 {
     uint32_t crc = 0xFFFF;
-    for (uint32_t n = 0; n < HOST_FLASH_WORDS - 2; n++) {
-        host_flash[n] = (n * 0x9E3779B1u) >> 8;
+    for (uint32_t n = 0; n < place; n++) {
         for (unsigned bit = 0; bit < 24; bit++) { /* the low byte first, of each the highest bit */
             uint32_t next = (host_flash[n] >> (8u * (bit / 8u) + 7u - bit % 8u)) & 1u;
             crc = ((crc << 1) ^ ((((crc >> 15) & 1u) ^ next) != 0 ? 0x1021u : 0u)) & 0xFFFFu;
         }
     }
-    host_flash[HOST_FLASH_WORDS - 2] = crc;
-    host_flash[HOST_FLASH_WORDS - 1] = crc ^ 0xFFFFu;
+    host_flash[place] = crc;
+    host_flash[place + 1] = crc ^ 0xFFFFu;
 }
+
+/* Any words, the kept parameters' pages erased. */
+static void fill_flash(void)
+{
+    for (uint32_t n = 0; n < HOST_FLASH_WORDS; n++) {
+        host_flash[n] = n < HOST_KEPT_WORD ? (n * 0x9E3779B1u) >> 8 : HOST_ERASED;
+    }
+    put_crc(HOST_KEPT_WORD - 2);
+    put_crc(HOST_FLASH_WORDS - 2);
+}
+
+/* ---- the flash programs itself ---- */
+
+uint16_t host_nvm_left = HOST_NVM_FOREVER;
+void (*host_power_fails)(void);
+static uint32_t latch = HOST_ERASED;
+static unsigned latched;
+
+void host_table_write(unsigned offset, uint32_t value, uint32_t mask)
+{
+    latched = offset / 2u;
+    latch = (latch & ~mask) | (value & mask);
+}
+
+/* A bit that changes: done or, where the supply fails meanwhile, any. */
+static uint32_t changed(uint32_t from, uint32_t to, bool fails)
+{
+    static uint32_t any = 1;
+    any = any * 1664525u + 1013904223u;
+    return fails ? (from & any >> 8) | (to & ~(any >> 8) & HOST_ERASED) : to;
+}
+
+void host_write_nvm(void)
+{
+    enum { ERASE_PAGE = 0x4042, PROGRAM_WORD = 0x4003 };
+    bool fails = host_nvm_left != HOST_NVM_FOREVER && --host_nvm_left == 0u;
+    if (NVMCON == ERASE_PAGE) {
+        for (unsigned n = latched & ~(HOST_PAGE_WORDS - 1u), end = n + HOST_PAGE_WORDS; n < end; n++) {
+            host_flash[n] = changed(host_flash[n], HOST_ERASED, fails);
+        }
+    } else if (NVMCON == PROGRAM_WORD) {
+        host_flash[latched] = changed(host_flash[latched], host_flash[latched] & latch, fails);
+    } else {
+        abort(); /* nothing that the firmware may ask for */
+    }
+    latch = HOST_ERASED;
+    if (fails) {
+        host_power_fails();
+    }
+}
+
+int host_kept_load(const char *path)
+{
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) {
+        return errno == ENOENT ? 0 : -1;
+    }
+    bool right = fread(host_flash + HOST_KEPT_WORD, sizeof host_flash[0], 2 * HOST_PAGE_WORDS, file) == 2 * HOST_PAGE_WORDS && fgetc(file) == EOF;
+    (void)fclose(file);
+    if (!right) {
+        fill_flash();
+    }
+    return right ? 0 : -1;
+}
+
+int host_kept_save(const char *path)
+{
+    FILE *file = fopen(path, "wb");
+    if (file == NULL) {
+        return -1;
+    }
+    bool right = fwrite(host_flash + HOST_KEPT_WORD, sizeof host_flash[0], 2 * HOST_PAGE_WORDS, file) == 2 * HOST_PAGE_WORDS;
+    return fclose(file) == 0 && right ? 0 : -1;
+}
+
+/* ---- the processor's own test ---- */
 
 /* The chain of firmware/board/selftest_cpu.c, and its two comparisons. */
 volatile uint16_t host_cpu_holds;

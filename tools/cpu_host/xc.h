@@ -64,9 +64,10 @@ void _DefaultInterrupt(void);
 extern volatile uint16_t host_watchdog_serves;
 void host_clear_watchdog(void);
 
-/* For the firmware's self-tests: a flash of made-up words with its CRC in the last two, RAM that nothing else uses, the place of a stack,
+/* For the firmware's self-tests: a flash of made-up words with its CRC in the last two, and in the two before the pages of kept parameters, RAM that nothing else uses, the place of a stack,
  * processor registers whose bits can be stuck, and a watchdog whose time passes only while it is waited for. A test plants faults here. */
 enum { HOST_FLASH_WORDS = 0x5800 / 2, HOST_FREE_WORDS = 64, HOST_STACK_WORDS = 16, HOST_W_REGISTERS = 16 };
+enum { HOST_KEPT_WORD = 0x5000 / 2, HOST_PAGE_WORDS = 0x0400 / 2 };
 extern uint32_t host_flash[HOST_FLASH_WORDS];
 extern volatile uint16_t host_free_ram[HOST_FREE_WORDS], host_stack[HOST_STACK_WORDS];
 extern uint16_t host_w_stuck_at_1[HOST_W_REGISTERS], host_w_stuck_at_0[HOST_W_REGISTERS];
@@ -79,6 +80,20 @@ uint8_t *host_window(void);
 size_t host_window_bytes(void);
 #define __builtin_tblrdl(offset) ((uint16_t)host_flash[(offset) / 2u])
 #define __builtin_tblrdh(offset) ((uint16_t)(host_flash[(offset) / 2u] >> 16))
+
+/* Programming of host_flash by NVMCON: a page of 512 words is erased, or a word programmed. What is written is there at once, unless the supply fails:
+ * with so many operations left, counted down, the last one is done in part, and host_power_fails() follows, from which a test jumps away. */
+extern uint16_t host_nvm_left; /* HOST_NVM_FOREVER: the supply does not fail */
+extern void (*host_power_fails)(void);
+enum { HOST_NVM_FOREVER = 0xFFFF };
+void host_table_write(unsigned offset, uint32_t value, uint32_t mask);
+void host_write_nvm(void);
+/* The kept parameters' pages from a file and to it. 0, or -1: it cannot be read, or written; none is no error of the first. */
+int host_kept_load(const char *path);
+int host_kept_save(const char *path);
+#define __builtin_tblwtl(offset, value) host_table_write((offset), (value), 0x00FFFFu)
+#define __builtin_tblwth(offset, value) host_table_write((offset), (uint32_t)(value) << 16, 0xFF0000u)
+#define __builtin_write_NVM() host_write_nvm()
 
 /* What XC16 builds in, and the instructions with no effect on a PC. */
 #define __builtin_write_OSCCONL(value) host_write_oscconl((unsigned)(value))

@@ -1,4 +1,4 @@
-"""Writes the tables of docs/ that are made from headers and loaders: faults, the schedule, limits, parameters, pins, keys of files, scope, self-tests, states, the
+"""Writes the tables of docs/ that are made from headers and loaders: faults, the schedule, limits, parameters, pins, keys of files, scope, kept parameters, self-tests, states, the
 simulator's assumptions, numbers chosen by trial.
 
     python3 -m tools.docs.tables                  writes the pages
@@ -119,6 +119,11 @@ def scope() -> str:
                      for head, found in (("service", services), ("error", errors), ("mode of scope_command", modes)))
 
 
+def kept() -> str:
+    found = {name: rows("include", "board/kept.h", f"KEPT_{name.upper()}_TABLE", "#number #name meaning") for name in ("request", "result", "state")}
+    return "\n".join(table(f"{name}, name, meaning", "rll", [list(row) for row in lines]) for name, lines in found.items())
+
+
 def simulator() -> str:
     found = rows("tools/cpu_33f", "iss_assumptions.h", "ASSUMPTIONS", "#name #value meaning place", also="tools/chip")
     return table("name, value, meaning, where", "lrll", [[f"`{name}`", *rest] for name, *rest in found])
@@ -150,7 +155,7 @@ def pins() -> str:
     return table("pin, port, analogue, remappable, also, on the MCLV, known from", "rllllll", chip_pins.page())
 
 
-PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "law": schedule, "limits": limits, "parameters": params,
+PAGES: dict[str, Callable[[], str]] = {"faults": faults, "files": files, "law": schedule, "kept": kept, "limits": limits, "parameters": params,
                                          "pins": pins, "scope": scope, "selftest": selftest, "simulator": simulator, "states": states,
                                          "tuned": tuned_numbers}
 

@@ -11,6 +11,8 @@ ELF_MACHINE = "EM_DSPIC30F"
 VECTORS_END = 0x200                 # reset, IVT, AIVT; above them the program
 PROGRAM = range(VECTORS_END, 0x5800, 2)
 FLASH = range(0, 0x5800, 2)
+KEPT = range(0x5000, 0x5800, 2)
+"""Two pages for parameters that outlive a reset, with PARAMS_KEPT: KEPT_AT of include/board/kept.h."""
 RAM = range(0x0800, 0x1000)
 CONFIGURATION = range(0xF80000, 0xF80018, 2)
 IVT, AIVT = 0x004, 0x104
@@ -95,3 +97,6 @@ BOARD_NEEDS = {
     "WDTPOST": "PS16", "FPWRT": "PWR128", "PWMPIN": "ON", "HPOL": "ON", "LPOL": "ON", "ICS": "PGD3", "JTAGEN": "OFF",
                "BWRP": "WRPROTECT_OFF", "BSS": "NO_FLASH", "GSS": "OFF", "GWRP": "OFF",
 }
+
+#: with PARAMS_KEPT: the watchdog waits while a page is erased
+KEPT_NEEDS = BOARD_NEEDS | {"WDTPOST": "PS64"}

@@ -15,7 +15,7 @@ from pathlib import Path
 from tools.common import command_line
 from tools.common.errors import UserError, suggestion
 
-from . import device, image
+from . import crc, device, image
 
 TOOLS = {"PK3": "PICkit 3", "PK4": "MPLAB PICkit 4", "PK5": "MPLAB PICkit 5", "ICD4": "MPLAB ICD 4", "SNAP": "MPLAB Snap"}
 NAMES = ("ipecmd.sh", "ipecmd", "ipecmd.exe")
@@ -48,7 +48,7 @@ def find(ipe: Path | None, usual: tuple[str, ...] = USUAL) -> str | None:
 def checked(hex_file: Path, elf_file: Path) -> list[str]:
     """Failures of the image that is about to be programmed."""
     elf, words = image.read_elf(elf_file), image.read_hex(hex_file)
-    return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8")), None)
+    return image.check(elf, words, None, image.wanted_fields(image.CONFIG_C.read_text(encoding="utf-8"), crc.keeps_parameters(elf)), None)
 
 
 def program(options: argparse.Namespace) -> int:

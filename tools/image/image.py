@@ -18,6 +18,7 @@ from .linked import Piece, default_handler_is_ours, divisions, origins, read_map
 from .program import Elf, Words, read_elf, read_hex, reset_target
 
 CONFIG_C = paths.ROOT / "firmware" / "board" / "main.c"
+CHOICE = re.compile(r"^#if PARAMS_KEPT\n(.*?)^#else\n(.*?)^#endif\n", re.MULTILINE | re.DOTALL)
 PRAGMA = re.compile(r"^\s*#\s*pragma\s+config\s+(\w+)\s*=\s*(\w+)\s*$", re.MULTILINE)
 
 
@@ -95,16 +96,17 @@ def check_vectors(words: Words, elf: Elf, pieces: list[Piece] | None) -> list[st
     return failures
 
 
-def wanted_fields(text: str) -> dict[str, str]:
-    """The settings of main.c."""
-    return dict(PRAGMA.findall(text))
+def wanted_fields(text: str, keeps: bool = False) -> dict[str, str]:
+    """The settings of main.c, in a program with PARAMS_KEPT or without."""
+    return dict(PRAGMA.findall(CHOICE.sub(lambda choice: choice[1 if keeps else 2], text)))
 
 
-def check_configuration(words: Words, config: dict[str, str]) -> list[str]:
+def check_configuration(words: Words, config: dict[str, str], keeps: bool = False) -> list[str]:
     """Every field of the configuration words as main.c and the board want it; a field that neither names is left alone."""
+    needs = device.KEPT_NEEDS if keeps else device.BOARD_NEEDS
     failures = [f"configuration: {name} = {config[name]} in main.c, but the board needs {value} ({device.FIELDS[name].values[value][1]})"
-                for name, value in device.BOARD_NEEDS.items() if config.get(name, value) != value]
-    for name, value in {**device.BOARD_NEEDS, **config}.items():
+                for name, value in needs.items() if config.get(name, value) != value]
+    for name, value in {**needs, **config}.items():
         field = device.FIELDS.get(name)
         if field is None or value not in field.values:
             failures.append(f"configuration: {name} = {value} in main.c is unknown for the {device.NAME}: "
@@ -176,7 +178,8 @@ def summary(words: Words, elf: Elf, limits: Limits | None, deepest: int | None =
     flash, ram = ((f"{limits.flash} bytes", f"{limits.ram} bytes") if limits else
                   (f"{len(device.PROGRAM) * attribution.BYTES_PER_WORD} bytes of the chip", f"{len(device.RAM)} bytes of the chip"))
     stack = stack_space(elf)
-    return (f"flash {flash_bytes(words) - start_up} of {flash}{f' and {start_up} of start-up code' if start_up else ''}, RAM {elf.ram_bytes} of {ram}, "
+    kept = f", {len(device.KEPT) * attribution.BYTES_PER_WORD} more for kept parameters" if crc.keeps_parameters(elf) else ""
+    return (f"flash {flash_bytes(words) - start_up} of {flash}{kept}{f' and {start_up} of start-up code' if start_up else ''}, RAM {elf.ram_bytes} of {ram}, "
             + ("" if deepest is None else f"stack at most {deepest}{f' of {limits.stack}' if limits else ''} bytes, ")
             + f"{stack if stack is not None else 'unknown'} bytes free for it")
 
@@ -185,7 +188,7 @@ def check(elf: Elf, words: Words, pieces: list[Piece] | None, config: dict[str, 
           deepest: int | None = None, start_up: int = 0) -> list[str]:
     """Every failure of an image; `pieces` None when there is no map, `deepest` None when nobody has looked for the deepest stack."""
     return [*check_device(elf), *check_memory(words), *check_same(words, elf), *check_reset(words, elf), *check_vectors(words, elf, pieces),
-            *check_configuration(words, config), *crc.check(words, elf), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []),
+            *check_configuration(words, config, crc.keeps_parameters(elf)), *crc.check(words, elf), *([*origins(elf, pieces), *divisions(elf, pieces)] if pieces is not None else []),
             *check_budget(words, elf, limits, deepest, start_up)]
 
 
@@ -210,7 +213,7 @@ def _run(options: argparse.Namespace) -> int:
     deepest, unsure = deepest_stack(options.elf, options.objdump, Budget.read()) if options.objdump else (None, [])
     start_up = start_up_bytes(options.elf, Budget.read(options.budget)) if options.objdump and limits else 0
     try:
-        config = wanted_fields(options.config.read_text(encoding="utf-8"))
+        config = wanted_fields(options.config.read_text(encoding="utf-8"), crc.keeps_parameters(elf))
     except OSError as error:
         raise UserError(f"cannot read the configuration ({error.strerror})", str(options.config)) from None
     failures = check(elf, words, pieces, config, limits, deepest, start_up) + [f"stack: {reason}" for reason in unsure if limits]

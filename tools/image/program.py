@@ -22,7 +22,7 @@ except ImportError as error:
 
 Words = dict[int, int]      # address -> 24-bit word
 
-WRITE, ALLOC, EXECUTE, PERSISTENT = 0x1, 0x2, 0x4, 0x02000000
+WRITE, ALLOC, EXECUTE, NOT_LOADED, PERSISTENT = 0x1, 0x2, 0x4, 0x00800000, 0x02000000
 CODE, CONSTANTS, DATA = "code", "constants", "data"
 LARGEST_FILE = 64 << 20
 HEX_START, HEX_END = ":", ":00000001FF"
@@ -179,7 +179,7 @@ def _elf(path: Path, data: bytes) -> Elf:
             debug[section.name[1:]] = section.data()[::2] # this ELF stores a byte of them in every second byte of the file
         elif kind in ("SHT_PROGBITS", "SHT_NOBITS") and size and (found := _section(section)):
             sections[number] = found
-            if found.memory != DATA:
+            if found.memory != DATA and not section["sh_flags"] & NOT_LOADED: # a place that stays erased
                 _add(words, found, section.data(), path)
     table = file.get_section_by_name(".symtab")
     if table is None or not words:

@@ -28,6 +28,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     parser.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
+    parser.add_argument("--kept", type=Path, metavar="FILE", help="the virtual board's pages of kept parameters: read from this file, and written in the end")
     parser.add_argument("--pace", default="1", help="motor seconds in a second: " + ", ".join(f"{pace:g}" for pace in PACES))
     parser.add_argument("--port", help="serial port of a real board, whose firmware has SCOPE 1")
     parser.add_argument("--elf", type=Path, metavar="FILE", help="ELF file of the firmware on it; default build/target/foc33.elf, as make firmware leaves it")
@@ -42,22 +43,25 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _live(options: argparse.Namespace) -> int:
-    from . import server # what only this needs: aiohttp
+    from . import kept, server # what only this needs: aiohttp
     pace, port = _pace(options.pace), _port(options.listen)
-    asyncio.run(server.serve(_real(options) if options.port else _virtual(options), port, pace, _tell))
+    if options.port and options.kept:
+        raise UserError("a real board has its own flash", "KEPT", "leave it out")
+    parts = _parts(options)
+    with kept.flash_in(options.kept, parts.library):
+        asyncio.run(server.serve(_real(options, parts) if options.port else _virtual(options, parts), port, pace, _tell))
     return 0
 
 
-def _real(options: argparse.Namespace) -> Callable[[], Any]:
+def _real(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any]:
     """Makes the bench of a board at a serial port. The PC's firmware, with the same header, tells what its numbers mean."""
     from .real_board import RealBoard
     from .symbols import Symbols
     symbols = Symbols.read(options.elf or IMAGE)
-    parts = _parts(options)
     return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params)
 
 
-def _virtual(options: argparse.Namespace) -> Callable[[], Any]:
+def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any]:
     """Makes the bench of a virtual board."""
     from .board import SCOPE
     from .recording import Origin
@@ -65,7 +69,6 @@ def _virtual(options: argparse.Namespace) -> Callable[[], Any]:
     from .virtual_board import VirtualBoard
     if options.elf is not None:
         raise UserError("an ELF file without a board", "ELF", "name the board's serial port, PORT=/dev/ttyUSB0")
-    parts = _parts(options)
     defines = command_common.macros(options.defines)
     words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
     origin = Origin(parts.motor, parts.board, defines + [SCOPE] * (SCOPE not in defines), words)

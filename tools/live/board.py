@@ -18,7 +18,7 @@ from tools.bench.scenario_file import MOTOR
 from tools.common import board_keys, command_line, paths
 from tools.common.errors import UserError
 
-from . import plain_elf
+from . import kept, plain_elf
 from .pace import RealTime
 
 SCOPE = "SCOPE=1"
@@ -112,6 +112,7 @@ def _arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
     parser.add_argument("--app", default="", help="application: a name of firmware/app or a path; the line is then without the scope")
     parser.add_argument("--cpu", choices=("host", "33f"), default="host", help="33f: an image of XC16 in the instruction-set simulator")
+    parser.add_argument("--kept", type=Path, metavar="FILE", help="the flash's pages of kept parameters: read from this file, and written in the end")
     parser.add_argument("--image", type=Path, help="its ELF file; default: built with XC16")
     return parser.parse_args(arguments)
 
@@ -124,8 +125,15 @@ def _told(live: LiveBoard) -> str:
 
 
 def _run(options: argparse.Namespace) -> int:
+    words = vars(options)
+    path, made_of = words.pop("kept"), parts(**words)
+    with kept.flash_in(path, made_of.library, made_of.image is not None):
+        return _live(made_of)
+
+
+def _live(made_of: Parts) -> int:
     try:
-        live = LiveBoard(parts(**vars(options)))
+        live = LiveBoard(made_of)
         print(_told(live), flush=True)
     except BoardError as error:
         raise UserError(f"the virtual board refuses: {error}", "live-board") from None

@@ -11,6 +11,7 @@ from tools.common import drive_tables
 from tools.common.errors import UserError
 
 from . import lnet, view
+from .kept import Kept
 from .pace import FRAME_S
 from .scope import Scope
 from .symbols import Symbols
@@ -43,6 +44,7 @@ class RealBoard:
     def __init__(self, port: Any, title: str, symbols: Symbols, params: Mapping[str, float]) -> None:
         self.port, self.title, self.symbols, self.params = port, title, symbols, params
         self.watch = Watch(symbols, params)
+        self.kept = Kept.of(symbols)
         self.begun_s = time.monotonic()
         self.time_s = 0.0
         self.values: dict[str, float] | None = None
@@ -100,6 +102,8 @@ class RealBoard:
             self._write(link, "clear_fault", 1)
         if self.remote is not None:
             self._command(link, self.remote, now_s)
+        if self.kept is not None:
+            self.kept.beat(link)
 
     def _command(self, link: lnet.Lnet, remote: Remote, now_s: float) -> None:
         """Renews the lease; where S2 has taken the command, it is S2's."""
@@ -127,7 +131,7 @@ class RealBoard:
 
     # ---- the page ----------------------------------------------------------------------------------------------------------
     def act(self, command: Any, who: Any = None) -> None:
-        """One of {"start": rpm}, {"target": rpm}, {"stop": true}, {"clear": true}."""
+        """One of {"start": rpm}, {"target": rpm}, {"stop": true}, {"clear": true}, {"keep": true}, {"forget": true}."""
         name, value = next(iter(command.items())) if isinstance(command, dict) and len(command) == 1 else (None, None)
         if name in ("start", "target"):
             low, high = self._range()
@@ -139,6 +143,8 @@ class RealBoard:
         elif name == "clear":
             self.clears = True
             self.note("clear the fault")
+        elif name in ("keep", "forget") and self.kept is not None:
+            self.kept.ask(name.upper())
         else:
             raise UserError("no such command", "page", "a real board takes start, target, stop, clear and scope")
 
@@ -174,7 +180,7 @@ class RealBoard:
         return {"virtual": False, "motor": self.title, "board": str(self.port), "defines": [], "sliders": {}, "throws": [],
                 "remote": {"low": low, "high": high}, "max_current_a": self.params["MAXIMUM_CURRENT_A"], "nominal_bus_v": self.params["NOMINAL_BUS_V"],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(False), "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
+                "panels": view.panels(False), "kept": self.kept is not None, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:
         """How things stand, as far as the board has told."""
@@ -185,12 +191,15 @@ class RealBoard:
             new = [self._strip_row(values)]
             self.strip.extend(new)
             self.rows.append({"time_s": round(self.time_s, 3)} | values)
+        while self.kept is not None and self.kept.news:
+            self.note(self.kept.news.popleft())
         told, self.told = self.told, self.lines
         reasons = int(values["limits"]) if values else 0
         return {"t": round(self.time_s, 3), "run": 1, "state": self.state, "fault": self.fault or "NONE",
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
                 "now": {name: round(value, 4) for name, value in values.items()} if values else None, "outputs": 63 if self.state in view.ON else 0,
                 "strip": new, "orbit": self._vectors(values), "log": [line for line in self.log if line["id"] >= told],
+                "kept": self.kept.told() if self.kept else None,
                 "remote": None if self.remote is None else {"run": self.remote.run, "target_rpm": self.remote.target_rpm},
                 "silent": time.monotonic() > max(self.heard_s, self.begun_s) + SILENT_S}
 

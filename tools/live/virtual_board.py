@@ -18,6 +18,7 @@ from tools.common.trace import Trace
 from . import view
 from .board import SCOPE
 from .faults import FAULTS, keys_of
+from .kept import Kept
 from .line import Line
 from .lnet import ANSWER_S, Lnet
 from .recording import BUTTONS, POT, Origin, Recording
@@ -42,6 +43,7 @@ class VirtualBoard:
         self.line = Line()
         self.scope: Scope | None = None
         self.symbols = symbols
+        self.kept = Kept.of(symbols)
         scenario = Scenario("live", "", "", "", "", 0.0, defines=origin.defines)
         self.job = simulate.prepare(scenario, library, origin.motor, origin.board)
         self.rated = motor_file.load(str(origin.motor.path))
@@ -70,7 +72,7 @@ class VirtualBoard:
     def start(self, publish: Callable[[dict[str, Any]], None]) -> None:
         """The scope's thread, where the firmware has a scope; it talks over the serial line while the board runs."""
         if self.symbols is not None:
-            self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish)
+            self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish, self.kept.beat if self.kept else lambda link: None)
             self.scope.start()
 
     def paced(self, pace: float) -> None:
@@ -165,8 +167,10 @@ class VirtualBoard:
 
     # ---- what somebody does ----------------------------------------------------------------------------------------------
     def act(self, command: Any, who: Any = None) -> None:
-        """One of {"press": "S2"}, {"release": "S2"}, {"set": [key, value]}, {"fault": [name, true]}, {"power": true}."""
+        """One of {"press": "S2"}, {"release": "S2"}, {"set": [key, value]}, {"fault": [name, true]}, {"power": true}, {"keep": true}, {"forget": true}."""
         work = {"press": self._press, "release": self._let_go, "set": self._turn, "fault": self._break, "power": lambda value, who: self.power_up()}
+        if self.kept is not None:
+            work |= {name: lambda value, who, request=name.upper(): self.kept.ask(request) for name in ("keep", "forget")}
         if not isinstance(command, dict) or len(command) != 1 or next(iter(command)) not in work:
             raise UserError("no such command", "page", "send one of " + ", ".join(work))
         name, value = next(iter(command.items()))
@@ -253,10 +257,12 @@ class VirtualBoard:
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(True), "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
+                "panels": view.panels(True), "kept": self.kept is not None, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:
         """What has happened since the last frame, and how things stand."""
+        while self.kept is not None and self.kept.news:
+            self.note(self.kept.news.popleft(), kind="action")
         told, self.told = self.told, self.lines
         new, self.new_strip = self.new_strip, []
         self.strip.extend(new)
@@ -266,6 +272,7 @@ class VirtualBoard:
         return {"t": round(self.time_s, 4), "state": self.state, "fault": self.fault,
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
                 "now": view.now(trace) | {"power_w": round(self.board.get("bus.voltage_v") * self.board.get("bus.current_a"), 3)},
+                "kept": self.kept.told() if self.kept else None,
                 "outputs": int(self.board.get("pwm.outputs_seen")),
                 "leds": {name: int(self.board.get("pin." + pins.firmware()[f"led_{name}"].pin)) for name in ("alive", "run")},
                 "settings": self.settings, "run": self.runs,

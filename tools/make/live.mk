@@ -2,10 +2,10 @@
 # `make run`; PORT ELF (a real board); CPU=33f (the simulated chip, with XC16=folder or IMAGE=file).
 tuned = $(if $(USERPARAMS),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,:))
 .PHONY: live live-pictures live-board live-library setup-live setup-scope
-live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= PORT=/dev/ttyUSB0 ELF=]
+live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= PORT=/dev/ttyUSB0 ELF= KEPT=file]
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
-	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN))) $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF)))
+	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN))) $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF))) $(if $(KEPT),--kept $(call quoted,$(KEPT)))
 
 live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
 	@$(alone) $(python) -m tools.live.pictures
@@ -13,11 +13,11 @@ live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make
 live-library:
 	$(call build,$(addprefix $B/,libvboard.so foc33.elf))
 
-live-board: setup-scope ## [run] the virtual board in real time, its serial line with the scope a pseudo-terminal [MOTOR= BOARD= DEFINES= APP=name USERPARAMS= CPU=33f IMAGE=file]
+live-board: setup-scope ## [run] the virtual board in real time, its serial line with the scope a pseudo-terminal [MOTOR= BOARD= DEFINES= APP=name USERPARAMS= CPU=33f IMAGE=file KEPT=file]
 	@$(if $(CPU),$(if $(filter 33f host,$(CPU)),,echo foc33: no processor $(call quoted,CPU=$(CPU)): use 33f or host >&2; exit 2))
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live.board $(if $(CPU),--cpu $(CPU)) $(if $(IMAGE),--image $(call quoted,$(IMAGE))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) \
-	    $(if $(APP),--app $(call quoted,$(APP))) $(what)
+	    $(if $(APP),--app $(call quoted,$(APP))) $(if $(KEPT),--kept $(call quoted,$(KEPT))) $(what)
 
 setup-scope:
 	@tools/setup/prepare.sh scope

@@ -32,9 +32,12 @@ extern const double probe_isr_us;
 /* Read or write a parameter while the motor turns, as a debugger does: the entries of the three field-weakening tables and what frames
  * them, by their names in userparams.h and in its units. The value is rounded to the firmware's counts and used from the next period on.
  * 0; -1 where this build keeps it as a constant (no PARAMS_IN_RAM), or never lets it change; -2 for a value outside its range. A
- * power-up does not bring the old values back. */
+ * power-up does not bring the old values back, but with PARAMS_KEPT. */
 int probe_param_get(const char *name, double *value);
 int probe_param_set(const char *name, double value);
+
+/* Before the firmware starts: parameters in RAM that can be kept have their start values again, as the chip's start-up code gives them. */
+void probe_power_up(void);
 
 /* Name of a fault code or of a state number as the signals "fault" and "state" give them; "" for a number that has no name. */
 const char *probe_fault_name(int code);

@@ -15,6 +15,10 @@ const probe_param_t probe_params[1] = {{"", 0.0, ""}};
 const unsigned probe_param_count = 0;
 const double probe_isr_us = 13.0;
 
+__attribute__((weak)) void probe_power_up(void)
+{
+}
+
 __attribute__((weak)) const char *probe_fault_name(int code)
 {
     (void)code;

@@ -260,6 +260,8 @@ static const key_entry_t table[] = {
     I("cpu.isr_dropped", chip.adc.dropped, 0.0, 0.0, 1.0, "", "1 = the ADC handler is not called any more"),
     I("cpu.background_periods", background_periods, 4.0, 1.0, 1000.0, "", "PWM periods between two passes of the main loop"),
     SP("cpu.crystal_hz", chip.clock.crystal_hz, set_crystal, 8e6, 1e5, 64e6, "Hz", "crystal"),
+    P("cpu.lprc_hz", chip.clock.lprc_hz, 32000.0, 16000.0, 128000.0, "Hz", "low-power oscillator, which drives the watchdog of a target image"),
+    R("cpu.flash_operations", chip.nvm.operations, "", "pages erased, words and rows programmed by a target image, since the board was made"),
     R("cpu.fcy_hz", chip.clock.fcy_hz, "Hz", "instruction clock"),
     W("cpu.isr_reset", set_isr_reset, "", "any value starts the measurement of the control interrupt anew"),
     R("cpu.isr_cycles", count.isr.last, "cycles", "the last control interrupt, entry to return"),

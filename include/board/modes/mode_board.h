@@ -96,7 +96,7 @@ uint16_t mode_panel(uint16_t elapsed_ms);
 
 /** Bytes that a mode has in RAM. */
 #if defined(TUNING) || defined(PARAMS_IN_RAM)
-#define SCOPE_MODE_PARAMS sizeof(drive_params_t)
+#define SCOPE_MODE_PARAMS (sizeof(drive_params_t) + ((PARAMS_KEPT) ? 192u : 0u)) /* and what kept.c has */
 #else
 #define SCOPE_MODE_PARAMS 0u
 #endif

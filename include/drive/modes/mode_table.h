@@ -44,7 +44,15 @@
 #define MODE_RELATION_DEFERRED(X)
 #endif
 
-#define MODE_RELATION_TABLE(X) MODE_RELATION_DEFERRED(X) MODE_RELATION_BRINGUP(X)
+/* Parameters that are constants have no value to be kept. */
+#if defined(TUNING) || defined(PARAMS_IN_RAM)
+#define MODE_RELATION_KEPT(X)
+#else
+#define MODE_RELATION_KEPT(X) \
+    X((PARAMS_KEPT) == 0, PARAM_NAMED(PARAMS_KEPT) " must be 0 without PARAMS_IN_RAM: add #define PARAMS_IN_RAM, or -DPARAMS_IN_RAM to DEFINES")
+#endif
+
+#define MODE_RELATION_TABLE(X) MODE_RELATION_DEFERRED(X) MODE_RELATION_BRINGUP(X) MODE_RELATION_KEPT(X)
 
 /* ---- PARAMS_IN_RAM: a debugger can change the parameters while the motor turns; TUNING needs it too ---- */
 

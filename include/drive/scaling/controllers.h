@@ -54,9 +54,10 @@
 #define TUNING_STEP_Q16 (PARAM_ROUND(SPEED_COUNTS(SLOW_PERIODS) * 65536.0F / (PARAM_F(TUNING_DELAY_RAMPUP) + 1.0F)))
 
 /* ---- Field weakening ---- */
+#define PARAM_18_OF(f) f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15), f(16), f(17)
 #define PARAM_18(f) \
     { \
-        f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7), f(8), f(9), f(10), f(11), f(12), f(13), f(14), f(15), f(16), f(17) \
+        PARAM_18_OF(f) \
     }
 #define PARAM_IDREF(i) CURRENT_Q13(IDREF_SPEED##i)
 #define PARAM_INVKFI_ENTRY(i) ((int16_t)PARAM_ROUND(PARAM_F(INVKFI_SPEED##i)))

@@ -115,6 +115,9 @@
 #ifndef SCOPE
 #define SCOPE 0
 #endif
+#ifndef PARAMS_KEPT
+#define PARAMS_KEPT 0
+#endif
 #define RETRY_COUNT 0
 #define RETRY_PAUSE_SEC 2
 #define RETRY_FORGET_SEC 10

@@ -19,7 +19,7 @@ function begin(hello) {
   const drive = new DriveView(hello), strips = new StripsView(hello);
   const send = (command) => link.send(command);
   const own = hello.virtual ? [board, new BenchView(hello, send), rotor ??= new RotorView(hello)] : [new RemoteView(hello.remote, send)];
-  views = { drive, strips, scope: new ScopeView(hello, send), planes: new PlanesView(hello), all: [drive, strips, ...own] };
+  views = { drive, strips, scope: new ScopeView(hello, send), planes: new PlanesView(hello), all: [drive, strips, new KeptView(hello, send), ...own] };
   run = 0;
 }
 
