@@ -103,7 +103,8 @@ typedef struct {
     R(pi_d.kp, pi_d.kp, 1, INT16_MAX) \
     R(pi_d.ki, pi_d.ki, 0, KEPT_KI_MOST) \
     R(pi_q.kp, pi_q.kp, 1, INT16_MAX) \
-        R(pi_q.ki, pi_q.ki, 0, KEPT_KI_MOST) R(speed_kp_q13, speed_kp_fast_q13, 1, INT16_MAX)
+    R(pi_q.ki, pi_q.ki, 0, KEPT_KI_MOST) \
+    R(speed_kp_q13, speed_kp_fast_q13, 1, INT16_MAX)
 #define KEPT_KI_MOST 32563 /* 15.9 * 2048 */
 
 /** X(condition): what must hold between the values of `p`, beyond each one's range. */
