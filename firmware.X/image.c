@@ -21,6 +21,7 @@
 #include "firmware/drive/catch.c"
 #include "firmware/drive/drive.c"
 #include "firmware/drive/handover.c"
+#include "firmware/drive/heat.c"
 #include "firmware/drive/held.c"
 #include "firmware/drive/inputs.c"
 #include "firmware/drive/limits.c"

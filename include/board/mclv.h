@@ -12,20 +12,20 @@
 
 /* ---- Pins, as port and bit: the only place that chooses them. "what; known from" feeds docs/pins.md ----
  * currents and bus: AN0..2 or AN3..5 in this order, which the converter samples at once; FAULT and UART: a pin with an RP number. */
-#define BOARD_PIN_CURRENT_A A, 0 /* current of phase A, 0.375 V/A around 1.65 V; AN1292 and published code for this board */
-#define BOARD_PIN_CURRENT_B A, 1 /* current of phase B; AN1292 and published code */
-#define BOARD_PIN_BUS B, 0       /* bus voltage / 16; published code, the divider is known for the MCLV-2 only [?] */
-#define BOARD_PIN_POT C, 2       /* potentiometer; published code */
+#define BOARD_PIN_CURRENT_A A, 0  /* current of phase A, 0.375 V/A around 1.65 V; AN1292 and published code for this board */
+#define BOARD_PIN_CURRENT_B A, 1  /* current of phase B; AN1292 and published code */
+#define BOARD_PIN_BUS B, 0        /* bus voltage / 16; published code, the divider is known for the MCLV-2 only [?] */
+#define BOARD_PIN_POT C, 2        /* potentiometer; published code */
 #define BOARD_PIN_MOTOR_NTC C, 0  /* NTC of the motor, to ground, with a resistor to 3.3 V; MOTOR_NTC_USED; [?] a spare input, follow it on the board */
 #define BOARD_PIN_BRIDGE_NTC C, 1 /* NTC of the bridge, the same; BRIDGE_NTC_USED; [?] a spare input, follow it on the board */
-#define BOARD_PIN_S2 A, 8        /* S2, low when pressed; published code */
-#define BOARD_PIN_S3 B, 4        /* S3, low when pressed; published code */
-#define BOARD_PIN_FAULT B, 8     /* FLTA1, the over-current comparator, low on a fault; published code */
-#define BOARD_PIN_UART_TX C, 3   /* serial line, transmits at 115200 baud; [?] try C, 5 (RP21) first if no line comes */
-#define BOARD_OTHER_TX C, 5      /* BRINGUP tries this one, too */
-#define BOARD_PIN_UART_RX C, 4   /* serial line, receives; one other program for this board, its board unknown [?] */
-#define BOARD_PIN_LED_ALIVE C, 6 /* LED: alive, fault code; [?] a free pin until it is known */
-#define BOARD_PIN_LED_RUN C, 7   /* LED: running; [?] a free pin until it is known */
+#define BOARD_PIN_S2 A, 8         /* S2, low when pressed; published code */
+#define BOARD_PIN_S3 B, 4         /* S3, low when pressed; published code */
+#define BOARD_PIN_FAULT B, 8      /* FLTA1, the over-current comparator, low on a fault; published code */
+#define BOARD_PIN_UART_TX C, 3    /* serial line, transmits at 115200 baud; [?] try C, 5 (RP21) first if no line comes */
+#define BOARD_OTHER_TX C, 5       /* BRINGUP tries this one, too */
+#define BOARD_PIN_UART_RX C, 4    /* serial line, receives; one other program for this board, its board unknown [?] */
+#define BOARD_PIN_LED_ALIVE C, 6  /* LED: alive, fault code; [?] a free pin until it is known */
+#define BOARD_PIN_LED_RUN C, 7    /* LED: running; [?] a free pin until it is known */
 /* The next four are used where the parameter of userparams.h says so; a board's switches for them need pull-downs, so that a chip in reset leaves them off. */
 #define BOARD_PIN_DIRECTION A, 4       /* direction input, DIRECTION_INPUT_USED, with the chip's pull-up; [?] a free pin */
 #define BOARD_PIN_FAULT_OUTPUT A, 7    /* relay: fault, FAULT_OUTPUT_USED; [?] a free pin */
@@ -36,7 +36,7 @@
 #define BOARD_LEVEL_FAULT_OUTPUT 0u   /* while there is a fault, and from power-up until the first period says that there is none */
 #define BOARD_LEVEL_RUNNING_OUTPUT 1u /* while the bridge conducts */
 #define BOARD_LEVEL_CHOPPER 1u        /* while the brake resistor is on */
-#define BOARD_PIN_PULSE B, 7     /* pulses as a command, of an application with app/pulse.h; [?] a free pin until it is known */
+#define BOARD_PIN_PULSE B, 7          /* pulses as a command, of an application with app/pulse.h; [?] a free pin until it is known */
 /* The chip fixes the PWM pins; a low side is one bit above its high side. */
 #define BOARD_PIN_PWM_A B, 14 /* PWM of phase A (M1), high side; published code */
 #define BOARD_PIN_PWM_B B, 12 /* PWM of phase B (M2), high side; published code */

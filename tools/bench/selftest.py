@@ -1,17 +1,13 @@
 """The self-test REGISTERS: which registers the firmware compares with what, and which of a board's differ."""
 
 import ctypes
-import re
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from tools.common import paths
-from tools.common.errors import UserError
 from tools.common.x_macro import rows
 from .board import BoardError, Library
 
-SOURCE = paths.ROOT / "firmware" / "board" / "selftest_run.c"
 FAULT, VARIABLE, REGISTERS = "SELFTEST", "board_selftest_failed", "REGISTERS"
 
 
