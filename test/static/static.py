@@ -4,6 +4,7 @@ A finding passes only if docs/deviations.md lists it, with the check's name, the
 any more fails too, so the page stays true. Environment: CC, CLANG, CLANG_TIDY, CPPCHECK (the tools to use).
 """
 
+import functools
 import os
 import re
 import subprocess
@@ -18,9 +19,11 @@ HERE = Path(__file__).parent
 PAGE = "docs/deviations.md"
 BUILD = Path("build/static")
 MODE_TABLE = Path("include/drive/modes/mode_table.h")
-COMBINED = [("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"),
-            ("TUNING", "SELFTEST_OFF"), ("TORQUE_PROFILE", "BIDIRECTIONAL_SPEED", "TORQUE_MODE"), ("TORQUE_MODE", "PARAMS_IN_RAM"), ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"),
-            ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT"), ("DIRECTION_INPUT_USED", "FAULT_OUTPUT_USED", "RUNNING_OUTPUT_USED", "BRAKE_CHOPPER_V=26")]
+PRODUCT = ("TORQUE_MODE", "PARAMS_IN_RAM", "PARAMS_KEPT", "APP_SERIAL", "APP_PULSE", "MOTOR_NTC_USED", "BRIDGE_NTC_USED", "DIRECTION_INPUT_USED",
+           "FAULT_OUTPUT_USED", "RUNNING_OUTPUT_USED", "BRAKE_CHOPPER_V=26")
+COMBINED = [PRODUCT, ("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"),
+            ("TUNING", "SELFTEST_OFF"), ("TORQUE_PROFILE", "BIDIRECTIONAL_SPEED", "TORQUE_MODE"),
+            ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT")]
 ON_TARGET = ("__XC16__",)
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
     -Wstrict-prototypes -Wmissing-prototypes -Wswitch-default -Wlogical-op -Wduplicated-cond -Wduplicated-branches -Wvla -Wtype-limits
@@ -95,9 +98,9 @@ def relative(path: str) -> str:
 
 
 def configurations() -> list[tuple[str, ...]]:
-    """Macros of each build that is looked at: as delivered, each mode alone, with the scope, with both temperatures, some modes together."""
+    """Macros of each build that is looked at: as delivered, each mode alone, with the scope, with all that a product may have, some modes together."""
     modes = re.findall(r"^ *X\((\w+), ", MODE_TABLE.read_text(encoding="utf-8"), re.M)
-    return [(), *((mode,) for mode in modes), ("SCOPE",), ("APP_SERIAL",), ("APP_PULSE",), ("MOTOR_NTC_USED", "BRIDGE_NTC_USED"), *COMBINED]
+    return [(), *((mode,) for mode in modes), ("SCOPE",), *COMBINED]
 
 
 def wishes(application: str) -> tuple[str, ...]:
@@ -110,7 +113,8 @@ def defines(configuration: tuple[str, ...]) -> list[str]:
     return [f"-D{name}" if "=" in name else f"-D{name}=1" for name in configuration]
 
 
-def preprocessed(source: str, options: list[str]) -> frozenset[tuple[str, int, str]]:
+@functools.cache
+def preprocessed(source: str, options: tuple[str, ...]) -> frozenset[tuple[str, int, str]]:
     """Every line of the project's that these options leave: file, number, and text after expansion."""
     lines, file, number = set(), "", 0
     for line in run([CLANG, *CLANG_16_BIT, *INCLUDES, *options, "-w", "-E", "-dD", source]).splitlines():
@@ -126,7 +130,7 @@ def preprocessed(source: str, options: list[str]) -> frozenset[tuple[str, int, s
 def distinct(source: str, of: list[tuple[str, ...]]) -> dict[tuple[str, ...], frozenset]:
     """The configurations that differ in this source's text, with their lines."""
     first: dict[frozenset, tuple[str, ...]] = {}
-    for configuration, lines in zip(of, each(lambda configuration: preprocessed(source, defines(configuration)), of), strict=True):
+    for configuration, lines in zip(of, each(lambda configuration: preprocessed(source, tuple(defines(configuration))), of), strict=True):
         first.setdefault(lines, configuration)
     return {configuration: lines for lines, configuration in first.items()}
 
@@ -216,12 +220,13 @@ def main() -> int:
     unit = one_unit(sources)
     texts = {source: distinct(source, configurations()) for source in (unit, *CHECKS_OF_PARAMETERS)}
     texts |= {source: distinct(source, [wishes(source)]) for source in other_applications()}
-    jobs = [(source, defines(configuration)) for source, its in texts.items() for configuration in its]
+    each_text = [(source, defines(configuration)) for source, its in texts.items() for configuration in its]
+    each_line = [(source, defines(configuration)) for source, its in texts.items() for configuration in cover(its)]
     checks = {
         "cppcheck": lambda: cppcheck(unit, distinct(unit, [*configurations(), ON_TARGET]), sources),
-        "clang_tidy": lambda: clang_tidy([(source, defines(modes)) for source, its in texts.items() for modes in cover(its)]),
-        "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], jobs),
-        "gcc": lambda: compiler("gcc", [os.environ.get("CC", "gcc"), *GCC_FLAGS], jobs),
+        "clang_tidy": lambda: clang_tidy(each_line),
+        "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], each_text),
+        "gcc": lambda: compiler("gcc", [os.environ.get("CC", "gcc"), *GCC_FLAGS], each_line),
     }
     passed = failed = 0
     for name, findings in zip(checks, each(lambda check: check(), checks.values())):
