@@ -76,8 +76,8 @@
 #define NTC_STEP_C 16
 #define NTC_NODES 13
 #define NTC_MOST_C 152
-#define PARAM_NTC_EXP_TOP(y, sign) (120.0F + (y) * (sign 60.0F + (y) * (12.0F + (y) * (sign 1.0F))))
-#define PARAM_NTC_EXP_EIGHTH(y) (PARAM_NTC_EXP_TOP(y, +) / PARAM_NTC_EXP_TOP(y, -))
+#define PARAM_NTC_EXP_TOP(y, sign) (120.0F + (y) * ((sign)*60.0F + (y) * (12.0F + (y) * (sign))))
+#define PARAM_NTC_EXP_EIGHTH(y) (PARAM_NTC_EXP_TOP(y, 1.0F) / PARAM_NTC_EXP_TOP(y, -1.0F))
 #define PARAM_SQUARED(x) ((x) * (x))
 #define PARAM_NTC_EXP(x) PARAM_SQUARED(PARAM_SQUARED(PARAM_SQUARED(PARAM_NTC_EXP_EIGHTH((x) / 8.0F))))
 #define PARAM_NTC_SHARE(stem, celsius) \
