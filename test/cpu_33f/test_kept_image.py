@@ -202,3 +202,7 @@ def test_damaged_copies_are_named_on_the_line(bench: Bench) -> None:
     bench.keeps(2)
     bench.power_up()
     assert bench.chosen() == 2 and bench.state() == STATES["KEPT"]
+
+
+def test_the_two_pages_count_with_no_module_and_the_stack_is_followed_through_the_built_in(parts) -> None:
+    assert "kept_nvm" in xc16.made("size", f"DEFINES={DEFINES}", "VARIANT=kept-size")

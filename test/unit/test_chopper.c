@@ -8,7 +8,7 @@
 
 #include "firmware/drive/limits.c"
 
-#define PERIODS_PER_SEC 20000u
+#define PERIODS_PER_SEC 20000ul
 
 static chopper_t chopper;
 static uint16_t now;

@@ -219,7 +219,8 @@ def _read(elf: Elf, by_lines: bool) -> Image:
         elif section.name == ".dinit":
             initial += [elf.words[address] for address in range(section.start, section.end, 2)]
         elif section.memory == CODE and section.start in device.PROGRAM:
-            words += [_word(address, debug, by_lines) or _unknown(address, named) for address in range(section.start, section.end, 2)]
+            words += [_word(address, debug, by_lines) or _unknown(address, named) for address in range(section.start, section.end, 2)
+                      if address in elf.words] # what stays erased is nobody's
     rest = elf.ram_bytes - sum(thing.size for thing in data)
     if rest:
         data.append(Thing("(alignment)", rest))

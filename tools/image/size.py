@@ -243,7 +243,7 @@ def disassemble(objdump: str, elf: Path) -> str:
     words = shlex.split(objdump)
     if shutil.which(words[0]) is None:
         raise UserError(f"no {words[0]}", "PATH", "install Microchip's XC16, or say where it is with XC16=folder")
-    done = subprocess.run([*words, "-d", str(elf)], capture_output=True, text=True, errors="replace", check=False)
+    done = subprocess.run([*words, "-d", "-z", str(elf)], capture_output=True, text=True, errors="replace", check=False)
     if done.returncode != 0:
         raise UserError(f"{words[0]} failed ({' '.join(done.stderr.split())})", str(paths.shown(elf)),
                         "build the image anew with `make firmware`")
