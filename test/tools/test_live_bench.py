@@ -9,7 +9,8 @@ from live_support import bench, origin, passes, started
 from support import document, refusal
 
 from tools.bench import report, scenario_file, simulate
-from tools.common.trace import wrapped_deg
+from tools.common.trace import Trace, wrapped_deg
+from tools.live import view, virtual_board
 from tools.live.faults import FAULTS
 from tools.live.recording import LONGEST_S
 
@@ -123,6 +124,36 @@ def test_curves_have_a_row_every_ten_milliseconds_however_time_passes():
         board.run(seconds)
         times += [row[0] for row in board.frame()["strip"]]
     assert np.diff(times) == pytest.approx(0.01, abs=2e-4) and len(times) > 300
+
+
+def test_numbers_and_curves_are_means_over_their_time_and_not_samples_at_the_ripples_edge():
+    board = started()
+    for key in ("motor.ld_h", "motor.lq_h"):
+        board.board.set(key, 2e-4)
+    passes(board, 0.5)
+    board.board.set("stat.reset", 1.0)
+    board.run(0.05)
+    last, frame, mean_nm = board.recent[-1], board.frame(), board.board.get("stat.torque_mean_nm")
+    assert last.column("plant.torque_nm").mean() < 0.7 * mean_nm # every sample stands at the same edge: their mean is another
+    assert frame["now"]["torque_nm"] == pytest.approx(mean_nm, abs=2e-4)
+    assert frame["now"]["i_q_a"] == pytest.approx(last.column("fw.i_q_a").mean(), abs=1e-4)
+    assert frame["now"]["theta_deg"] == pytest.approx(last.column("plant.theta_e_deg")[-1], abs=1e-3) # of this moment
+    rows = [row for row in frame["strip"] if row[0] > last.time_s[0] + 0.01]
+    for row in rows:
+        share = (last.time_s > row[0] - 0.01 + 2e-5) & (last.time_s <= row[0] + 2e-5)
+        assert row[8] == pytest.approx(1000.0 * last.column("plant.torque_mean_nm")[share].mean(), abs=0.05)
+        assert row[5] == pytest.approx(last.column("fw.i_q_a")[share].mean(), abs=1e-3)
+    assert len(rows) == 4 and np.mean([row[8] for row in rows]) == pytest.approx(1000.0 * mean_nm, abs=0.5)
+
+
+def test_a_curve_has_a_gap_where_it_means_nothing_and_the_mean_of_what_does():
+    columns = {name: np.zeros(6) for name in virtual_board.SIGNALS} | {"plant.torque_mean_nm": np.array([1.0, 2.0, 3.0, 4.0, 5.0, 9.0]), "fw.i_q_a": np.arange(6.0),
+                                                                       "pwm.outputs_seen": np.array([0.0, 63.0, 63.0, 63.0, 0.0, 63.0])}
+    trace = Trace(list(columns), np.arange(6) * 0.1, np.array(list(columns.values())))
+    assert [[row[0], row[5], row[8]] for row in view.strip(trace, 2, {})] == [[0.1, 1.0, 1500.0], [0.3, 2.5, 3500.0], [0.5, 5.0, 7000.0]]
+    columns["pwm.outputs_seen"][3] = 0.0
+    assert [row[5] for row in view.strip(Trace(list(columns), trace.time_s, np.array(list(columns.values()))), 2, {})] == [1.0, None, 5.0]
+    assert view.strip(trace, 7, {}) == []
 
 
 def test_the_orbit_is_one_turn_of_the_voltage_that_is_asked_for_and_ends_where_the_vector_is():

@@ -55,33 +55,42 @@ PANELS = (
     Panel("current", "A", (Line("d", "fw.i_d_a", "i_d_a", D, SWITCHING), Line("q", "fw.i_q_a", "i_q_a", Q, SWITCHING),
                            Line("q asked for", "fw.iq_ref_a", "iq_ref_a", REFERENCE, SWITCHING, True),
                            Line("learned", "fw.profile_a", "", ESTIMATE, CONTROLLED))),
-    Panel("torque", "mN·m", (Line("motor", "plant.torque_nm", "", TRUE),)),
+    Panel("torque", "mN·m", (Line("motor", "plant.torque_mean_nm", "", TRUE),)),
     Panel("bus", "V", (Line("bus", "bus.voltage_v", "bus_v", D),)))
 SCALES = {"mN·m": 1000.0}
 NOW = {"speed_rpm": "plant.speed_rpm", "estimate_rpm": "fw.speed_est_rpm", "reference_rpm": "fw.speed_ref_rpm", "target_rpm": "fw.speed_target_rpm",
        "theta_deg": "plant.theta_e_deg", "theta_est_deg": "fw.theta_est_deg", "i_d_a": "fw.i_d_a", "i_q_a": "fw.i_q_a", "iq_limit_a": "fw.iq_limit_a",
-       "v_d_v": "fw.v_d_v", "v_q_v": "fw.v_q_v", "v_limit_v": "fw.v_limit_v", "torque_nm": "plant.torque_nm", "bus_v": "bus.voltage_v"}
+       "v_d_v": "fw.v_d_v", "v_q_v": "fw.v_q_v", "v_limit_v": "fw.v_limit_v", "torque_nm": "plant.torque_mean_nm", "bus_v": "bus.voltage_v"}
 """The numbers of the moment, by the page's name."""
+MEANS = ("speed_rpm", "estimate_rpm", "i_d_a", "i_q_a", "v_d_v", "v_q_v", "torque_nm", "bus_v")
+"""Of these the mean over a frame's time: a sample stands at one edge of the PWM's ripple. The torque is a mean within each period, too; the currents are what the
+firmware samples."""
 
 
-def strip(trace: Trace, every: int, phase: int, states: dict[int, str]) -> list[list[float | None]]:
-    """Rows of the rolling curves: time, then a value for each curve of the panels in their order. `phase`: how many rows of the trace came before."""
-    picked = slice(-phase % every, None, every)
-    state = trace.column("fw.state")[picked]
-    means = {ALWAYS: np.ones(len(state), bool), SWITCHING: trace.column("pwm.outputs_seen")[picked] > 0,
+def strip(trace: Trace, every: int, states: dict[int, str]) -> list[list[float | None]]:
+    """Rows of the rolling curves, one for each `every` rows of the trace: their last time, then the mean of each curve of the panels in their order, over
+    the rows in which it means something."""
+    ends = np.arange(every - 1, len(trace), every)
+    if not len(ends):
+        return []
+    starts = ends - every + 1
+    state = trace.column("fw.state")
+    means = {ALWAYS: np.ones(len(state), bool), SWITCHING: trace.column("pwm.outputs_seen") > 0,
              ESTIMATING: np.isin(state, [number for number, name in states.items() if name in ESTIMATES]),
              CONTROLLED: np.isin(state, [number for number, name in states.items() if name in CLOSED])}
     columns = []
     for panel in PANELS:
         for line in panel.lines:
-            values = trace.column(line.signal)[picked].astype(float) * SCALES.get(panel.unit, 1.0)
-            columns.append([value if good else None for value, good in zip(values.round(4).tolist(), means[line.when].tolist())])
-    return [list(row) for row in zip(trace.time_s[picked].round(4).tolist(), *columns)]
+            good, upto = means[line.when], ends[-1] + 1
+            counts = np.add.reduceat(good[:upto].astype(int), starts)
+            sums = np.add.reduceat(np.where(good, trace.column(line.signal).astype(float), 0.0)[:upto], starts) * SCALES.get(panel.unit, 1.0)
+            columns.append([round(total / count, 4) if count and last else None for total, count, last in zip(sums.tolist(), counts.tolist(), good[ends].tolist())])
+    return [list(row) for row in zip(trace.time_s[ends].round(4).tolist(), *columns)]
 
 
-def now(trace: Trace) -> dict[str, float]:
-    """The last row, under the page's names."""
-    return {name: round(float(trace.column(signal)[-1]), 4) for name, signal in NOW.items()}
+def now(trace: Trace, rows: int) -> dict[str, float]:
+    """The last row, under the page's names; of MEANS the mean of the last `rows`."""
+    return {name: round(float(trace.column(signal)[-rows:].mean(dtype=float) if name in MEANS else trace.column(signal)[-1]), 4) for name, signal in NOW.items()}
 
 
 def orbit(trace: Trace) -> dict[str, list[list[float]]]:

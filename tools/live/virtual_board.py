@@ -25,7 +25,7 @@ from .recording import BUTTONS, POT, Origin, Recording
 from .scope import Scope
 from .symbols import Symbols
 
-SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm", "fw.profile_a"]
+SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm", "fw.profile_a", "plant.torque_mean_nm"]
 FIRST_S = 0.01
 """What passes at power-up before anybody can act."""
 RECORDED_ROW_S = 0.001
@@ -109,6 +109,10 @@ class VirtualBoard:
         self.log: deque[dict[str, Any]] = deque(maxlen=LOG_LINES)
         self.lines, self.told, self.rows_seen = 0, 0, 0
         self.recent: list[Trace] = []
+        self.recent_rows = 0
+        """those that no frame has shown"""
+        self.begun: Trace | None = None
+        """the curves' row that is not whole yet"""
         self.line.clear()
         self.strip: deque[list[float]] = deque(maxlen=round(view.STRIP_S / view.STRIP_ROW_S))
         self.new_strip: list[list[float]] = []
@@ -140,12 +144,21 @@ class VirtualBoard:
         self.recent.append(trace)
         self._note_changes(trace, "fw.state", self.library.states, self._note_state)
         self._note_changes(trace, "fw.fault", self.library.faults, self._note_fault)
-        self.new_strip += view.strip(trace, round(view.STRIP_ROW_S / self.period_s), self.rows_seen, self.library.states)
+        self._draw(trace)
         every = round(RECORDED_ROW_S / self.period_s)
         first = -self.rows_seen % every
         if len(trace) > first:
             self.recording.add_rows(trace.time_s[first::every], trace.data[:, first::every].T)
         self.rows_seen += len(trace)
+        self.recent_rows += len(trace)
+
+    def _draw(self, trace: Trace) -> None:
+        """More of the curves."""
+        every = round(view.STRIP_ROW_S / self.period_s)
+        whole = _joined([self.begun, trace] if self.begun else [trace])
+        self.new_strip += view.strip(whole, every, self.library.states)
+        rest = len(whole) - len(whole) % every
+        self.begun = Trace(SIGNALS, whole.time_s[rest:], whole.data[:, rest:])
 
     @staticmethod
     def _note_changes(trace: Trace, signal: str, names: dict[int, str], note: Any) -> None:
@@ -266,12 +279,12 @@ class VirtualBoard:
         told, self.told = self.told, self.lines
         new, self.new_strip = self.new_strip, []
         self.strip.extend(new)
-        trace = Trace(SIGNALS, np.concatenate([part.time_s for part in self.recent]), np.concatenate([part.data for part in self.recent], axis=1))
-        self.recent = self.recent[-1:] # where nothing passes until the next frame, it shows the last moment again
+        trace, rows = _joined(self.recent), self.recent_rows or len(self.recent[-1])
+        self.recent, self.recent_rows = self.recent[-1:], 0 # where nothing passes until the next frame, it shows the last moment again
         reasons = int(self.board.get("fw.limits"))
         return {"t": round(self.time_s, 4), "state": self.state, "fault": self.fault,
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
-                "now": view.now(trace) | {"power_w": round(self.board.get("bus.voltage_v") * self.board.get("bus.current_a"), 3)},
+                "now": view.now(trace, rows) | {"power_w": round(self.board.get("bus.voltage_v") * self.board.get("bus.current_a"), 3)},
                 "kept": self.kept.told() if self.kept else None,
                 "outputs": int(self.board.get("pwm.outputs_seen")),
                 "leds": {name: int(self.board.get("pin." + pins.firmware()[f"led_{name}"].pin)) for name in ("alive", "run")},
@@ -287,6 +300,11 @@ class VirtualBoard:
     def csv(self) -> str:
         """The trace since power-up, at most that of the last two minutes."""
         return self.recording.csv()
+
+
+def _joined(parts: list[Trace]) -> Trace:
+    """One trace of several that follow one another."""
+    return Trace(SIGNALS, np.concatenate([part.time_s for part in parts]), np.concatenate([part.data for part in parts], axis=1))
 
 
 def _key(button: str) -> str:

@@ -321,6 +321,7 @@ static const key_entry_t table[] = {
     R("plant.speed_rpm", latch.speed_rpm, "rpm", "mechanical speed"),
     R("plant.turns", latch.turns, "rev", "mechanical revolutions since creation"),
     R("plant.torque_nm", latch.torque_nm, "N.m", "electromagnetic torque"),
+    R("plant.torque_mean_nm", latch.torque_mean_nm, "N.m", "electromagnetic torque, mean of the period before"),
     R("plant.v_d", latch.v_d, "V", "d voltage at the terminals, mean of the period before"),
     R("plant.v_q", latch.v_q, "V", "q voltage at the terminals, mean of the period before"),
     /* statistics since the last reset */

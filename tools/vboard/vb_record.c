@@ -20,6 +20,7 @@ void vb_latch(vb_t *vb)
     l->speed_rpm = forward * m->omega / m->pole_pairs * PLANT_RPM_PER_RAD_S;
     l->torque_nm = forward * plant_motor_torque(m);
     l->turns = forward * (m->turns + m->omega * vb->plant.now_s / (2.0 * PLANT_PI * m->pole_pairs));
+    l->torque_mean_nm = forward * m->torque_nm;
     l->v_d = m->vd_v;
     l->v_q = forward * m->vq_v;
     vb->trace.due = true;
