@@ -2,17 +2,18 @@
 
 import csv
 import io
+import time
 
 import numpy as np
 import pytest
-from live_support import bench, origin, passes, started
+from live_support import bench, origin, passes, started, until
 from support import document, refusal
 
 from tools.bench import report, scenario_file, simulate
 from tools.common.trace import Trace, wrapped_deg
 from tools.live import view, virtual_board
 from tools.live.faults import FAULTS
-from tools.live.recording import LONGEST_S
+from tools.live.recording import LONGEST_S, SENT
 
 ENDS = {"open_a": "OPEN_PHASE", "open_b": "OPEN_PHASE", "open_c": "OPEN_PHASE", "never_on": "CURRENT_SENSOR", "never_off": "OVERCURRENT_HW",
         "ia_zero": "OPEN_PHASE", "ib_stuck": "CURRENT_SENSOR", "ib_rail": "OVERCURRENT_SW", "ia_gain": "CURRENT_SENSOR", "bus_half": "UNDERVOLTAGE",
@@ -196,6 +197,34 @@ def test_make_run_repeats_a_saved_scenario_to_the_last_bit_and_its_expectations_
         assert np.array_equal(run.trace.column(name)[rows], trace.column(name)), name
     outcomes = report.check(run)
     assert [outcome.row for outcome in outcomes if not outcome.ok] == [] and len(outcomes) >= 3
+
+
+def test_a_saved_scenario_is_the_same_to_the_last_bit_though_the_scope_ran_and_says_what_it_holds_of_it():
+    board = bench()
+    assert "send_hex" not in board.recording.toml(1.0)
+    board.start(lambda message: None)
+    board.scope.ask({"channels": ["board_drive.angle"], "trigger": None, "level": 0, "rising": True, "position": 0.0, "factor": 1, "mode": "auto"})
+    try:
+        until(lambda: passes(board, 0.05) and board.scope.trace, "no trace")
+        for command in ({"set": ["input.pot", 0.3]}, {"press": "S2"}, {"release": "S2"}):
+            board.act(command)
+        for _ in range(30):
+            passes(board, 0.05)
+            time.sleep(0.01) # for the scope
+    finally:
+        board.end()
+    text, trace = board.scenario(), board.recording.trace()
+    assert text.count("send_hex") > 5 and SENT in text
+    run = repeated(board, text)
+    rows = np.searchsorted(run.trace.time_s, trace.time_s - 1e-6)
+    for name in ("plant.theta_e_deg", "plant.i_a", "fw.i_q_a", "fw.state"):
+        assert np.array_equal(run.trace.column(name)[rows], trace.column(name)), name
+
+
+def test_bytes_of_the_serial_line_that_are_none_are_one_line():
+    text = 'title = "x"\nmotor = "hurst_dmb0224c10002"\nduration_s = 1.0\n[[event]]\nat_s = 0.5\nsend_hex = "{}"\n'
+    assert scenario_file.read(document(text.format("55 fF00"))).events[0].text == "U\xff\0"
+    refusal(lambda: scenario_file.read(document(text.format("5 0g"))), "'5 0g' is no row of bytes", "two hexadecimal digits")
 
 
 def test_the_expectations_of_a_saved_scenario_fail_when_the_drive_does_something_else():

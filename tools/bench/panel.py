@@ -138,6 +138,8 @@ def _actions(event: Event, panel: _Panel) -> list[Action]:
         return [Action(event.at_s, parameters=event.parameters if event.at_s > 0.0 else {}, text=event.note or event.written)]
     if event.kind == "send":
         return [Action(event.at_s, sends=event.text + "\n", text=event.note or f"serial line: {event.text}")]
+    if event.kind == "send_hex": # a scope's are too many to be told
+        return [Action(event.at_s, sends=event.text, text=event.note)]
     try:
         if event.finds_range:
             panel.ranges.check_speed(event.value)

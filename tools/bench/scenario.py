@@ -36,7 +36,7 @@ class Event:
     over_s: float = 0.0
     note: str = ""
     text: str = ""
-    """which of SPEEDS, or the line to send"""
+    """which of SPEEDS, the line to send, or the bytes to send as characters"""
     written: str = ""
     """how the file gave the value, where that is not the kind and the value"""
     finds_range: bool = False

@@ -26,7 +26,8 @@ EVENT_KINDS = {
     "debug": "writes 16-bit variables of the firmware, as a debugger would: `{ SnapStart = 1 }`",
     "parameter": "changes parameters of userparams.h, in a build with PARAMS_IN_RAM or TUNING; a list goes on with the table's next entries: "
                  "`{ IDREF_SPEED5 = [-0.7, -0.8] }`",
-    "send": "a line of text for the firmware's serial line, without its end"}
+    "send": "a line of text for the firmware's serial line, without its end",
+    "send_hex": "bytes for the firmware's serial line: `\"55 05 01\"`; a scenario saved while the scope ran has them"}
 """What an event does, and what docs/files.md says of it."""
 
 
@@ -126,7 +127,7 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
     meaning = EVENT_KINDS[kind]
     if hold_s is not None and kind != "press":
         raise section.fail("hold_s", f"'hold_s' with '{kind}'", "only press is held; remove it")
-    if over_s is not None and kind in ("start_rpm", "press", "debug", "parameter", "send"):
+    if over_s is not None and kind in ("start_rpm", "press", "debug", "parameter", "send", "send_hex"):
         raise section.fail("over_s", f"'over_s' with '{kind}'", "only potentiometer and set can take time; remove it")
     event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0}
     if kind == "start_rpm":
@@ -142,6 +143,8 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
         event["parameters"], event["written"] = _parameters(section, kind, meaning)
     elif kind == "send":
         event["text"] = section.text(kind, meaning=meaning)
+    elif kind == "send_hex":
+        event["text"] = _bytes(section, kind, meaning)
     elif kind == "speed":
         event["text"] = section.choice(kind, SPEEDS, meaning=meaning)
     else:
@@ -151,6 +154,15 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
 
 _EVENT_RANGES = {"pot": {"minimum": 0.0, "maximum": 1.0}, "speed_percent": {"minimum": -1000.0, "maximum": 1000.0},
                  "torque_percent": {"minimum": 0.0, "maximum": 1000.0}}
+
+
+def _bytes(section: Section, key: str, meaning: str) -> str:
+    """Bytes as characters of the same numbers."""
+    text = section.text(key, meaning=meaning)
+    try:
+        return bytes.fromhex(text).decode("latin-1")
+    except ValueError:
+        raise section.fail(key, f"'{text}' is no row of bytes", "write two hexadecimal digits for each, such as \"55 05 01\"") from None
 
 
 def _variables(section: Section, key: str, meaning: str) -> dict[str, int]:

@@ -21,6 +21,8 @@ POT, BUTTONS = "input.pot", {"input.s2": "S2", "input.s3": "S3"}
 FAULT_MARGIN_S = 0.1
 """Around the moment of a fault, in what the scenario expects."""
 
+SENT = "# The events send_hex are what the scope said on the serial line: without them the run is not the same to the last bit.\n"
+
 
 @dataclass(frozen=True)
 class Origin:
@@ -44,6 +46,8 @@ class Recording:
     row_s: float
     """time between two rows of the trace"""
     actions: list[tuple[float, dict[str, float]]] = field(default_factory=list)
+    sent: list[tuple[float, str]] = field(default_factory=list)
+    """what the scope has said on the serial line. A character brings the main loop's next pass forward, and all that follows is a little other."""
     states: list[tuple[float, str]] = field(default_factory=list)
     faults: list[tuple[float, str]] = field(default_factory=list)
     rows: deque[tuple[np.ndarray, np.ndarray]] = field(default_factory=deque)
@@ -73,6 +77,7 @@ class Recording:
             raise UserError("nothing has happened yet", "scenario", "do something first")
         words = " ".join(f"{name}={shlex.quote(word)}" for name, word in self.origin.words.items())
         parts = [f"# Recorded at the page of make live. Run it again: make run SCENARIO=./recorded.toml{' ' * bool(words)}{words}\n"
+                 + SENT * bool(self.sent) +
                  f'title = "recorded: {self._title()}"\n'
                  f"motor = {_text(_name(self.origin.motor, paths.MOTORS))}\nboard = {_text(_name(self.origin.board, paths.BOARDS))}\n"
                  f"duration_s = {_number(end_s)}\n"]
@@ -80,7 +85,8 @@ class Recording:
             parts.append(f"[firmware]\ndefines = {json.dumps(self.origin.defines)}\n")
         if self.plant:
             parts.append("[plant]\n" + "".join(f"{_text(key)} = {_number(value)}\n" for key, value in self.plant.items()))
-        return "\n".join([*parts, *self._events(end_s), *self._expectations(end_s)])
+        sent = (_event(at_s, f"send_hex = {_text(text.encode('latin-1').hex(' '))}") for at_s, text in self.sent)
+        return "\n".join([*parts, *self._events(end_s), *sent, *self._expectations(end_s)])
 
     def _title(self) -> str:
         return ", ".join(name for name, _ in itertools.groupby(name for _, name in self.states))[:100] or "at rest"

@@ -135,10 +135,17 @@ class VirtualBoard:
         self.board.run(periods)
         self.time_s = self.board.get("time_s")
         data = self.board.trace_take()
-        self.line.exchange(self.board.uart_send, self.board.uart_take())
+        self.line.exchange(self._send, self.board.uart_take())
         if len(data):
             times = before_s + (self.time_s - before_s) / len(data) * np.arange(1, len(data) + 1)
             self._recorded(Trace(SIGNALS, times, np.ascontiguousarray(data.T)))
+
+    def _send(self, text: str) -> int:
+        """Characters for the board, which are part of the recording."""
+        count = self.board.uart_send(text)
+        if count:
+            self.recording.sent.append((self.time_s, text[:count]))
+        return count
 
     def _recorded(self, trace: Trace) -> None:
         self.recent.append(trace)
