@@ -1,4 +1,5 @@
-"""What pytest knows beyond Python tests: Unity executables (unity_suites.py) and suites side by side, as make test shows them (side_by_side.py)."""
+"""What pytest knows beyond Python tests: Unity executables (unity_suites.py), suites side by side, as make test shows them (side_by_side.py), and a browser
+(live_browser.py)."""
 
 import os
 import subprocess
@@ -7,7 +8,7 @@ import pytest
 
 os.environ["FOC33_QUIET"] = "1" # what a command says on stderr does not depend on how long it takes
 
-pytest_plugins = ["unity_suites", "side_by_side"]
+pytest_plugins = ["unity_suites", "side_by_side", "live_browser"]
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from live_browser import SIZE, Page
 from live_support import kept_parts, served, until
 from support import document
 
@@ -11,61 +12,13 @@ from tools.bench import scenario_file
 from tools.common import paths
 
 HOME, END, ARROW_DOWN = "\ue011", "\ue010", "\ue015"
-SIZES = [(1400, 900), (1000, 700)]
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory):
-    """The browser, and the folder where it saves."""
-    done = subprocess.run(["make", "-s", "setup-browser"], cwd=paths.ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
-    if done.returncode != 0:
-        pytest.fail(done.stdout, pytrace=False)
-    from tools.live import browser # needs what has just been installed
-    folder = tmp_path_factory.mktemp("saved")
-    driver = browser.start(folder)
-    browser.resize(driver, *SIZES[0])
-    yield driver, folder
-    driver.quit()
+SIZES = [SIZE, (1000, 700)]
 
 
 @pytest.fixture(scope="module")
 def server():
     with served() as running:
         yield running
-
-
-class Page:
-    """What a user sees and does. A page that is open stays open: to draw it costs more than what the tests do with it."""
-
-    def __init__(self, driver, url: str) -> None:
-        self.driver = driver
-        if driver.current_url != url:
-            driver.get(url)
-        self.wait("return window.eval('foc33.frames') > 2", "no frames come")
-
-    def run(self, script: str, *arguments):
-        return self.driver.execute_script(script, *arguments)
-
-    def frame(self) -> dict:
-        return self.run("return window.eval('foc33.frame')")
-
-    def wait(self, script: str, what: str, seconds: float = 15.0):
-        return until(lambda: self.run(script), lambda: f"{what}: {self.run('return document.body.innerText')[:600]}", seconds)
-
-    def one(self, selector: str):
-        return self.driver.find_element("css selector", selector)
-
-    def text(self, selector: str) -> str:
-        return self.one(selector).text
-
-    def state(self, name: str) -> None:
-        self.wait(f"return document.querySelector('#states .now')?.dataset.state === '{name}'", f"the state is not {name}")
-
-    def click(self, selector: str) -> None:
-        self.one(selector).click()
-
-    def slide(self, key: str, value: float) -> None:
-        self.run("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", self.one(f'input[name="{key}"]'), value)
 
 
 @pytest.fixture

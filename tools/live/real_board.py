@@ -59,6 +59,7 @@ class RealBoard:
         self.log: deque[dict[str, Any]] = deque(maxlen=200)
         self.lines = self.told = 0
         self.state = self.fault = ""
+        self.was_silent = False
         self.first_link: lnet.Lnet | None = self._connect()
 
     def _connect(self) -> lnet.Lnet:
@@ -185,7 +186,8 @@ class RealBoard:
     def frame(self) -> dict[str, Any]:
         """How things stand, as far as the board has told."""
         new = []
-        values = self.values
+        silent = self._silent()
+        values = None if silent else self.values
         if values is not None:
             self._note_changes(values)
             new = [self._strip_row(values)]
@@ -195,13 +197,21 @@ class RealBoard:
             self.note(self.kept.news.popleft())
         told, self.told = self.told, self.lines
         reasons = int(values["limits"]) if values else 0
-        return {"t": round(self.time_s, 3), "run": 1, "state": self.state, "fault": self.fault or "NONE",
+        return {"t": round(self.time_s, 3), "run": 1, "state": "" if silent else self.state, "fault": self.fault or "NONE",
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
-                "now": {name: round(value, 4) for name, value in values.items()} if values else None, "outputs": 63 if self.state in view.ON else 0,
+                "now": {name: round(value, 4) for name, value in values.items()} if values else None, "outputs": 63 if self.state in view.ON and not silent else 0,
                 "strip": new, "orbit": self._vectors(values), "log": [line for line in self.log if line["id"] >= told],
                 "kept": self.kept.told() if self.kept else None,
                 "remote": None if self.remote is None else {"run": self.remote.run, "target_rpm": self.remote.target_rpm},
-                "silent": time.monotonic() > max(self.heard_s, self.begun_s) + SILENT_S}
+                "silent": silent}
+
+    def _silent(self) -> bool:
+        """No answer for a while: how things stand is not known. Each change has its line in the log."""
+        silent = time.monotonic() > max(self.heard_s, self.begun_s) + SILENT_S
+        if silent != self.was_silent:
+            self.note("no answer" if silent else "it answers again", "fault")
+        self.was_silent = silent
+        return silent
 
     def _note_changes(self, values: dict[str, float]) -> None:
         state = dict(enumerate(view.states())).get(int(values["state"]), "?")

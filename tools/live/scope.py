@@ -116,6 +116,8 @@ class Scope(threading.Thread):
                 if self.link is None:
                     self.link = self.open_link()
                     self.link.device_info()
+                    if self.told["status"] not in ("waits", "stop"): # it answers again
+                        self._tell(status="stop" if self.setup is None or self.setup.mode == "stop" else "waits")
                 self._round(self.link)
             except (lnet.LnetError, OSError) as error:
                 self.link = None
@@ -135,6 +137,7 @@ class Scope(threading.Thread):
         if setup is None or setup.mode == "stop":
             self.changed.wait(POLL_S)
             return
+        self.publish({"armed": True})
         begun_s, size = time.monotonic(), link.scope_state().size
         self._start(link, setup, setup.trigger is not None, size)
         while link.scope_state().running:

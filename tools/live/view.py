@@ -48,7 +48,8 @@ class Panel:
     lines: tuple[Line, ...]
 
 
-TRUE, ESTIMATE, REFERENCE, D, Q = "#2f6fb0", "#d9822b", "#9aa4ae", "#1f8a70", "#7048b5"
+TRUE, ESTIMATE, REFERENCE, D, Q = "true", "estimate", "reference", "d", "q"
+"""Colours of the page's style, which has them for light and dark."""
 PANELS = (
     Panel("speed", "rpm", (Line("reference", "fw.speed_ref_rpm", "reference_rpm", REFERENCE, CONTROLLED, True),
                            Line("estimate", "fw.speed_est_rpm", "estimate_rpm", ESTIMATE, ESTIMATING), Line("true", "plant.speed_rpm", "", TRUE))),

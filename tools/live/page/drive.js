@@ -12,6 +12,11 @@ class DriveView {
     this.note(hello.log);
   }
 
+  // The state is what it was when it was told.
+  unknown() {
+    for (const item of this.states) { item.classList.remove("now"); }
+  }
+
   show(frame) {
     for (const item of this.states) { item.classList.toggle("now", item.dataset.state === frame.state); }
     const told = [frame.fault, ...frame.limits].join();

@@ -7,8 +7,14 @@ function say(text) {
   by("message").textContent = text;
 }
 
+// Without an answer the last values are grey, and no state is claimed.
+function hush(on) {
+  document.body.classList.toggle("silent", on);
+  if (on) { views?.drive.unknown(); }
+}
+
 let silent = false;
-const link = new Link(take, say);
+const link = new Link(take, say, hush);
 const board = new BoardView((command) => link.send(command));
 
 function begin(hello) {
@@ -23,38 +29,41 @@ function begin(hello) {
   run = 0;
 }
 
+let paceBusy = 0; // until then what the board tells of the pace may be older than what somebody chose
 function tempo(frame) {
   const slow = frame.measured !== null && frame.measured < 0.95 * frame.pace;
   by("time").textContent = `${frame.t.toFixed(frame.pace < 0.1 ? 3 : 1)} s`;
-  if (document.activeElement !== by("pace")) { by("pace").value = String(frame.pace); }
+  if (performance.now() > paceBusy && by("pace").value !== String(frame.pace)) { by("pace").value = String(frame.pace); }
   by("measured").classList.toggle("slow", slow);
   by("measured").textContent = slow ? `this machine manages 1 : ${(1 / frame.measured).toFixed(frame.measured > 0.1 ? 1 : 0)}` : "";
 }
 
 // The next message comes when this one is on the screen: a slow machine, or a tab out of sight, gets fewer.
 function take(message) {
-  if (message.t !== undefined || message.scope || message.trace) { requestAnimationFrame(() => link.send({ seen: true })); }
+  if (message.t !== undefined || message.scope || message.trace || message.armed) { requestAnimationFrame(() => link.send({ seen: true })); }
   if (message.hello) { begin(message.hello); return; }
   if (message.ended) { say(`The board has stopped: ${message.ended}`); return; }
   if (message.refused) { foc33.refused = message.refused; say(message.refused); setTimeout(() => say(""), 4000); return; }
   if (!views) { return; }
   if (message.scope) { views.scope.set(message.scope); return; }
+  if (message.armed) { views.scope.armed(); return; }
   if (message.trace) { views.scope.draw(message.trace); foc33.traces++; return; }
   if (run && message.run !== run) { views.drive.clear(); views.strips.clear(); }
   run = message.run;
   tempo(message);
   views.all.forEach((view) => view.show(message));
   if (message.now) { views.planes.show(message); } // a real board that has not answered yet has no numbers
-  if (message.silent !== undefined && message.silent !== silent) { silent = message.silent; say(silent ? "The board does not answer: is it on, is its cable in?" : ""); }
+  if (message.silent !== undefined && message.silent !== silent) { silent = message.silent; hush(silent); say(silent ? "no answer from the board: is it on, is its cable in? What is grey is older." : ""); }
   foc33.frame = message;
   foc33.frames++;
 }
 
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { views?.strips.fit(); views?.scope.fit(); });
+
 by("power").addEventListener("click", () => link.send({ power: true }));
-by("pace").addEventListener("change", () => { link.send({ pace: Number(by("pace").value) }); by("pace").blur(); });
+by("pace").addEventListener("change", () => { paceBusy = performance.now() + 500; link.send({ pace: Number(by("pace").value) }); });
 for (const what of ["scenario", "csv"]) {
-  by(`save-${what}`).addEventListener("click", async (event) => { // what cannot be saved says why, instead of an empty file
-    event.preventDefault();
+  by(`save-${what}`).addEventListener("click", async () => { // what cannot be saved says why, instead of an empty file
     const answer = await fetch(`/save/${what}${location.search}`);
     if (!answer.ok) { say((await answer.text()).trim()); setTimeout(() => say(""), 6000); return; }
     const file = make("a", { href: URL.createObjectURL(await answer.blob()), download: { scenario: "recorded.toml", csv: "recorded.csv" }[what] }, document.body);

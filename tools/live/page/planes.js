@@ -1,6 +1,4 @@
 // Voltage and current as vectors: in the stator's frame with the hexagon that the bus allows, and in the rotor's.
-const TRUE = "#2f6fb0", ESTIMATE = "#d9822b", GREY = "#c3cad1", CURRENT = "#7048b5";
-
 // A canvas of its element's width, in sharp pixels: [context, width, height].
 function fitted(canvas, aspect) {
   const width = canvas.clientWidth, height = Math.round(width * aspect), ratio = window.devicePixelRatio || 1;
@@ -63,7 +61,7 @@ class PlanesView {
   }
 
   axes(c, w, h, x, y) {
-    Object.assign(c, { strokeStyle: "#e8ecef", lineWidth: 1, fillStyle: "#9aa4ae" });
+    Object.assign(c, { strokeStyle: tint("grid"), lineWidth: 1, fillStyle: tint("soft") });
     c.beginPath();
     c.moveTo(-w / 2, 0);
     c.lineTo(w / 2, 0);
@@ -75,9 +73,9 @@ class PlanesView {
   }
 
   legend(c, w, h, current) {
-    c.fillStyle = TRUE;
+    c.fillStyle = tint("true");
     label(c, "voltage", 4 - w / 2, h / 2 - 7, "left");
-    c.fillStyle = CURRENT;
+    c.fillStyle = tint("q");
     label(c, current, w / 2 - 4, h / 2 - 7, "right");
   }
 
@@ -100,17 +98,17 @@ class PlanesView {
     const [c, w, h] = fitted(by("stator"), PlanesView.ASPECT), [volt, ampere] = this.scales(w, h, now.bus_v);
     c.translate(w / 2, h / 2);
     this.axes(c, w, h, "α", "β");
-    Object.assign(c, { strokeStyle: GREY, lineWidth: 1.2 });
+    Object.assign(c, { strokeStyle: tint("hexagon"), lineWidth: 1.2 });
     c.beginPath();
     for (let n = 0; n < 6; n++) { c[n ? "lineTo" : "moveTo"](...polar(2 / 3 * now.bus_v * volt, 60 * n)); }
     c.closePath();
     c.stroke();
-    this.ring(c, now.v_limit_v * volt, GREY, [3, 3]);
-    this.path(c, orbit.v, volt, "#2f6fb066");
-    this.path(c, orbit.i, ampere, "#7048b577");
+    this.ring(c, now.v_limit_v * volt, tint("hexagon"), [3, 3]);
+    this.path(c, orbit.v, volt, `${tint("true")}66`);
+    this.path(c, orbit.i, ampere, `${tint("q")}77`);
     const [v, i] = [orbit.v.at(-1), orbit.i.at(-1)];
-    if (v) { arrow(c, 0, 0, v[0] * volt, -v[1] * volt, TRUE, 2); }
-    if (i) { arrow(c, 0, 0, i[0] * ampere, -i[1] * ampere, CURRENT, 2); }
+    if (v) { arrow(c, 0, 0, v[0] * volt, -v[1] * volt, tint("true"), 2); }
+    if (i) { arrow(c, 0, 0, i[0] * ampere, -i[1] * ampere, tint("q"), 2); }
     this.legend(c, w, h, "current");
   }
 
@@ -118,14 +116,14 @@ class PlanesView {
     const [c, w, h] = fitted(by("frame"), PlanesView.ASPECT), [volt, ampere] = this.scales(w, h, now.bus_v);
     c.translate(w / 2, h / 2);
     this.axes(c, w, h, "d", "q");
-    this.ring(c, now.v_limit_v * volt, "#2f6fb055", [3, 3]);
-    this.ring(c, this.hello.max_current_a * ampere, "#7048b555", [3, 3]);
+    this.ring(c, now.v_limit_v * volt, `${tint("true")}55`, [3, 3]);
+    this.ring(c, this.hello.max_current_a * ampere, `${tint("q")}55`, [3, 3]);
     this.trail.push([now.i_d_a, now.i_q_a]);
     this.trail.splice(0, this.trail.length - 40);
-    this.path(c, this.trail, ampere, "#7048b555");
+    this.path(c, this.trail, ampere, `${tint("q")}55`);
     if (outputs) {
-      arrow(c, 0, 0, now.v_d_v * volt, -now.v_q_v * volt, TRUE, 2);
-      arrow(c, 0, 0, now.i_d_a * ampere, -now.i_q_a * ampere, CURRENT, 2);
+      arrow(c, 0, 0, now.v_d_v * volt, -now.v_q_v * volt, tint("true"), 2);
+      arrow(c, 0, 0, now.i_d_a * ampere, -now.i_q_a * ampere, tint("q"), 2);
     }
     this.legend(c, w, h, `current, circle ${this.hello.max_current_a} A`);
   }

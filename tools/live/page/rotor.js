@@ -52,15 +52,15 @@ class RotorView {
     c.rotate(-this.shown * Math.PI / 180); // counter-clockwise is forward
     this.magnets(c, r * 0.62);
     c.restore();
-    arrow(c, 0, 0, ...polar(r * 0.86, this.shown), TRUE, 3);
-    if (this.estimated) { arrow(c, 0, 0, ...polar(r * 0.86, this.shown + this.error), ESTIMATE, 2, [5, 4]); }
+    arrow(c, 0, 0, ...polar(r * 0.86, this.shown), tint("true"), 3);
+    if (this.estimated) { arrow(c, 0, 0, ...polar(r * 0.86, this.shown + this.error), tint("estimate"), 2, [5, 4]); }
     c.fillStyle = "#fff";
     circle(c, 0, 0, 4);
     c.fill();
   }
 
   stator(c, r) {
-    c.strokeStyle = "#e3e7eb";
+    c.strokeStyle = tint("ring");
     c.lineWidth = 14;
     circle(c, 0, 0, r - 7);
     c.stroke();

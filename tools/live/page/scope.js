@@ -1,14 +1,17 @@
 // The firmware's own scope: which variables, when it is triggered, and its last trace; variables of one unit share an axis.
 class ScopeView {
-  static COLORS = ["#1f8a70", "#7048b5", "#2f6fb0", "#d9822b"];
+  static COLORS = ["d", "q", "true", "estimate"];
   static FACTORS = [1, 2, 5, 10, 20, 50, 100, 200];
   static PREFIXES = ["board_drive.run.", "board_drive."]; // left out where a name is shown
-  static HEIGHT = 176;
+  static HEIGHT = 190;
+  static LEAST_HEIGHT = 66; // of a panel: three labels
+  static ARMED_MS = 300; // so long "triggered" stays while the next trace is awaited
 
   constructor(hello, send) {
     by("scope-card").hidden = !hello.scope;
     if (!hello.scope) { return; }
-    Object.assign(this, { send, units: hello.scope.variables, period: hello.scope.period_s, setup: hello.scope.setup, graphs: [], layout: "", trace: null });
+    Object.assign(this, { send, units: hello.scope.variables, period: hello.scope.period_s, setup: hello.scope.setup, graphs: [], layout: "", trace: null, zoom: null });
+    this.keys();
     this.names = new Map(Object.keys(this.units).map((name) => [this.short(name), name]));
     by("variables").replaceChildren(...[...this.names.keys()].sort().map((name) => new Option(name)));
     this.channels();
@@ -31,7 +34,7 @@ class ScopeView {
       const input = make("input", { type: "text", placeholder: "no variable", spellcheck: false, title: "a variable of the firmware; clear it to leave the channel out" }, by("scope-channels"));
       input.setAttribute("list", "variables");
       input.setAttribute("aria-label", `channel ${n + 1}`);
-      input.style.borderLeftColor = color;
+      input.style.borderLeftColor = `var(--${color})`;
       input.addEventListener("focus", () => { if (input.value) { input.dataset.before = input.value; } });
       input.addEventListener("change", () => {
         input.classList.toggle("wrong", Boolean(input.value) && !this.whole(input.value));
@@ -82,8 +85,21 @@ class ScopeView {
     by("scope-factor").value = setup.factor;
     for (const item of ["scope-edge", "scope-level", "scope-position"]) { by(item).disabled = !setup.trigger; }
     for (const button of document.querySelectorAll("#scope-mode button")) { button.setAttribute("aria-pressed", String(button.dataset.mode === setup.mode)); }
-    by("scope-status").textContent = { waits: setup.trigger ? "waits for its trigger" : "records", stop: "stopped" }[status] ?? status;
-    by("scope-status").classList.toggle("bad", !["waits", "stop"].includes(status));
+    this.say({ waits: this.waits(), stop: "stopped" }[status] ?? status, !["waits", "stop"].includes(status));
+  }
+
+  waits() { return this.setup.trigger ? "waits for its trigger" : "records"; }
+
+  say(text, bad = false) {
+    clearTimeout(this.timer);
+    by("scope-status").textContent = by("scope-status").title = text;
+    by("scope-status").classList.toggle("bad", bad);
+  }
+
+  // The next trace is awaited: what was said of the last one goes, unless another follows at once.
+  armed() {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.say(this.waits()), ScopeView.ARMED_MS);
   }
 
   groups(trace) {
@@ -105,25 +121,67 @@ class ScopeView {
       const groups = this.groups(trace);
       this.graphs = groups.map(([unit, members], n) => this.panel(unit, members, n === groups.length - 1, groups.length));
     }
-    const window_ = [trace.rows[0][0] * 1000, trace.rows.at(-1)[0] * 1000];
-    for (const { graph, members } of this.graphs) {
-      graph?.updateOptions({ file: trace.rows.map((row) => [row[0] * 1000, ...members.map((n) => row[n + 1])]), dateWindow: window_ });
-    }
-    if (this.setup.mode !== "stop") { by("scope-status").textContent = trace.triggered ? "triggered" : "not triggered"; }
+    const whole = [trace.rows[0][0] * 1000, trace.rows.at(-1)[0] * 1000];
+    if (!this.span || Math.abs(whole[1] - whole[0] - this.span[1] + this.span[0]) > 1e-6) { this.zoom = null; } // another rate or position
+    this.span = whole;
+    const files = this.graphs.map(({ members }) => trace.rows.map((row) => [row[0] * 1000, ...members.map((n) => row[n + 1])]));
+    this.update((n) => ({ file: files[n], dateWindow: this.zoom ?? whole }));
+    if (this.setup.mode !== "stop") { this.say(trace.triggered ? "triggered" : "not triggered"); }
+  }
+
+  // All panels at once; none of them then takes it for somebody's zoom.
+  update(options) {
+    this.updating = true;
+    this.graphs.forEach(({ graph }, n) => graph?.updateOptions(options(n)));
+    this.updating = false;
+  }
+
+  // One panel shows another stretch of time: the others follow, and traces to come stay there.
+  show([from, to]) {
+    const [first, last] = this.span;
+    this.zoom = from <= first && to >= last ? null : [from, to];
+    this.update(() => ({ dateWindow: this.zoom ?? this.span }));
+  }
+
+  followed(graph) {
+    if (this.updating || !this.span) { return; }
+    const [from, to] = graph.xAxisRange(), [before, after] = this.zoom ?? this.span;
+    if (Math.abs(from - before) > 1e-9 || Math.abs(to - after) > 1e-9) { this.show([from, to]); }
+  }
+
+  // + and - zoom around the middle, the arrows move, 0 shows all.
+  keys() {
+    by("scope-graphs").onkeydown = (event) => {
+      if (!this.span || event.ctrlKey || event.altKey || event.metaKey) { return; }
+      const [from, to] = this.zoom ?? this.span, span = to - from, [first, last] = this.span;
+      const [factor, shift] = { "+": [0.5, 0], "=": [0.5, 0], "-": [2, 0], ArrowLeft: [1, -0.25], ArrowRight: [1, 0.25], 0: [1e9, 0] }[event.key] ?? [];
+      if (!factor) { return; }
+      event.preventDefault();
+      const wide = Math.min(span * factor, last - first), start = (from + to) / 2 + shift * span - wide / 2;
+      const begin = Math.max(first, Math.min(last - wide, start));
+      this.show([begin, begin + wide]);
+    };
+  }
+
+  // Light or dark.
+  fit() {
+    if (!this.graphs) { return; }
+    this.update((n) => ({ colors: this.graphs[n].members.map((m) => tint(ScopeView.COLORS[m % 4])), ...look() }));
   }
 
   panel(unit, members, last, count) {
     const names = members.map((n) => this.short(this.trace.names[n])), box = make("div", { className: "strip" }, by("scope-graphs"));
     const head = make("div", { className: "head" }, box), place = make("div", { className: "graph" }, box);
-    place.style.height = `${Math.round(ScopeView.HEIGHT / count) + (last ? 18 : 0)}px`;
+    const room = ScopeView.HEIGHT * (window.innerWidth >= 1800 ? 2 : 1);
+    place.style.height = `${Math.max(ScopeView.LEAST_HEIGHT, Math.round(room / count)) + (last ? 18 : 0)}px`;
     const legend = make("div", { className: "legend" }, head);
     if (!window.Dygraph) { return { members }; }
     const graph = new Dygraph(place, [[0, ...members.map(() => 0)]], {
-      labels: ["ms", ...names], colors: members.map((n) => ScopeView.COLORS[n % 4]), strokeWidth: 1.5, legend: "always", labelsDiv: legend, highlightCircleSize: 2,
-      legendFormatter: (data) => this.legend(data, unit), gridLineColor: "#eef1f4", axisLineColor: "#e2e6ea", rightGap: 8, xRangePad: 0, yRangePad: 6,
+      labels: ["ms", ...names], colors: members.map((n) => tint(ScopeView.COLORS[n % 4])), strokeWidth: 1.5, legend: "always", labelsDiv: legend, highlightCircleSize: 2,
+      legendFormatter: (data) => this.legend(data, unit), ...look(), drawCallback: (g, first) => { if (!first) { this.followed(g); } }, xRangePad: 0, yRangePad: 6,
       underlayCallback: (canvas, area, g) => this.marks(canvas, area, g, members),
       axes: { x: { drawAxis: last, axisLabelFontSize: 11, axisLabelFormatter: (t) => `${Number(t.toFixed(4))} ms`, pixelsPerLabel: 80 },
-              y: { axisLabelFontSize: 11, axisLabelWidth: 46, pixelsPerLabel: 22, axisLabelFormatter: (v) => String(Number(v.toPrecision(6))) } } });
+              y: AXIS } });
     return { graph, members };
   }
 
@@ -136,7 +194,7 @@ class ScopeView {
   // The trigger: its moment, and its level where its variable is drawn.
   marks(canvas, area, graph, members) {
     if (!this.trace.triggered) { return; }
-    canvas.strokeStyle = "#aab4bd";
+    canvas.strokeStyle = tint("soft");
     canvas.setLineDash([3, 4]);
     canvas.beginPath();
     const x = Math.round(graph.toDomXCoord(0)) + 0.5;

@@ -24,7 +24,7 @@ class StripsView {
     make("h2", { textContent: `${panel.title} [${panel.unit}]` }, head);
     const values = panel.lines.map((line) => {
       const item = make("span", { textContent: `${line.name} ` }, head);
-      item.style.color = line.color;
+      item.style.color = `var(--${line.color})`;
       return make("em", { textContent: "" }, item);
     });
     const place = make("div", { className: "graph" }, box);
@@ -32,10 +32,10 @@ class StripsView {
     const labels = ["s", ...panel.lines.map((line) => line.name)];
     const series = Object.fromEntries(panel.lines.map((line) => [line.name, { strokePattern: line.dashed ? [5, 4] : null, strokeWidth: line.dashed ? 1.2 : 1.6 }]));
     const graph = new Dygraph(place, [[0, ...panel.lines.map(() => null)]], {
-      labels, series, colors: panel.lines.map((line) => line.color), legend: "never", interactionModel: {}, showLabelsOnHighlight: false, highlightCircleSize: 0,
-      dateWindow: [0, 10], gridLineColor: "#eef1f4", axisLineColor: "#e2e6ea", rightGap: 8,
+      labels, series, colors: panel.lines.map((line) => tint(line.color)), legend: "never", interactionModel: {}, showLabelsOnHighlight: false, highlightCircleSize: 0,
+      dateWindow: [0, 10], ...look(),
       axes: { x: { drawAxis: last, axisLabelFontSize: 11, axisLabelFormatter: (t) => `${Number(t.toFixed(3))} s`, pixelsPerLabel: 80 },
-              y: { axisLabelFontSize: 11, axisLabelWidth: 46, pixelsPerLabel: 20, axisLabelFormatter: (v) => String(Number(v.toPrecision(6))) } } });
+              y: AXIS } });
     return { graph, values, column, panel };
   }
 
@@ -47,6 +47,9 @@ class StripsView {
   }
 
   clear() { this.rows = []; }
+
+  // Light or dark.
+  fit() { this.graphs.forEach(({ graph, panel }) => graph?.updateOptions({ colors: panel.lines.map((line) => tint(line.color)), ...look() })); }
 
   show(frame) {
     this.add(frame.strip);
