@@ -406,15 +406,19 @@ test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ...
 	$(call run_suites,$(quick_suites))
 
 # In one go and in sight; each check's own target looks again for what it alone needs.
-browser := chromium=chromium chromedriver=chromium-driver module:selenium=python3-selenium
+browser := chromium=chromium chromedriver=chromium-driver module:selenium=python3-selenium npm=npm
+axe_version := 4.10.3
+axe := build/setup/axe-core-$(axe_version).js
 setup-checks: setup-test
 	@$(if $(ONLY),:,test/static/need.sh $(browser) cppcheck=cppcheck clang-14=clang-14 clang-tidy-14=clang-tidy-14 gcovr=gcovr \
 	    soffice=libreoffice-calc-nogui)
+	@$(if $(ONLY)$(wildcard $(axe)),:,tools/setup/axe.sh $(axe_version) $(axe))
 
 # What the tests and the pictures of the page of make live need.
 .PHONY: setup-browser
 setup-browser: setup-test
 	@test/static/need.sh $(browser)
+	@$(if $(wildcard $(axe)),:,tools/setup/axe.sh $(axe_version) $(axe))
 
 setup-test:
 	@tools/setup/prepare.sh test

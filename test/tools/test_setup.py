@@ -10,7 +10,7 @@ import pytest
 
 from tools.common.paths import ROOT
 
-TOOLS = ("sh", "mkdir", "cat", "echo", "sed", "tr", "grep", "tail", "cut", "sleep", "touch", "env", "rm", "head", "cp", "ln")
+TOOLS = ("sh", "mkdir", "cat", "echo", "sed", "tr", "grep", "tail", "cut", "sleep", "touch", "env", "rm", "head", "cp", "mv", "ln")
 VENV = "python3 -m venv build/setup/venv && build/setup/venv/bin/python -m pip install numpy matplotlib tqdm"
 PACKAGES = "python3 python3-numpy python3-matplotlib python3-tqdm"
 
@@ -50,6 +50,9 @@ class Machine:
     def read(self, name: str) -> str:
         path = self.root / name
         return path.read_text(encoding="utf-8") if path.exists() else ""
+
+
+NPM = 'd=$3/node_modules/axe-core; mkdir -p "$d"; echo axe >"$d/axe.min.js"' # npm install --prefix <folder>
 
 
 @pytest.fixture
@@ -95,10 +98,11 @@ def test_modules_in_the_project_s_own_environment_are_found_first_and_need_no_ro
 
 @pytest.mark.parametrize("line, title", [
     ("tools/setup/prepare.sh run", "installing packages"), ("test/static/need.sh cppcheck=cppcheck", "installing packages"),
-    ("tools/setup/gems.sh 1.2.1 stamp", "installing the gem")])
+    ("tools/setup/gems.sh 1.2.1 stamp", "installing the gem"), ("tools/setup/axe.sh 4.10.3 axe.js", "installing axe-core")])
 def test_a_long_installation_says_now_and_then_what_it_does(machine, line, title):
     machine.program("apt-get", "echo Fetched $2; case $* in *install*) sleep 2.5; ln -sf /bin/true \"$BIN/python3\";; esac")
     machine.program("gem", "echo Fetched ceedling; sleep 2.5")
+    machine.program("npm", f"{NPM}; echo Fetched axe; sleep 2.5")
     code, said = machine.run(line, FOC33_BEAT_S="1", BIN=str(machine.bin))
     assert code == 0 and re.findall(rf"(?m)^  {title}: (\d) s, Fetched \S+$", said) == ["1", "2"], said
     assert "  " + title not in machine.run(line, FOC33_BEAT_S="1", FOC33_QUIET="1", BIN=str(machine.bin))[1]
@@ -139,6 +143,19 @@ def test_the_gem_needs_no_root_and_is_refused_where_nothing_may_be_installed(mac
         0, "foc33: installing the ceedling gem 1.2.1 (Unity and CMock) into build/gems; no root is needed\n")
     code, said = machine.run("tools/setup/gems.sh 1.2.1 stamp", INSTALL="no")
     assert code == 2 and re.fullmatch(r"foc33: set-up, missing: the ceedling gem 1\.2\.1: [^\n]+\n", said)
+
+
+def test_axe_needs_no_root_and_is_refused_where_nothing_may_be_installed_or_can_be(machine):
+    machine.program("npm", NPM)
+    assert machine.run("tools/setup/axe.sh 4.10.3 build/setup/axe-core-4.10.3.js") == (
+        0, "foc33: installing axe-core 4.10.3 into build/setup; no root is needed\n")
+    assert machine.read("build/setup/axe-core-4.10.3.js") == "axe\n"
+    code, said = machine.run("tools/setup/axe.sh 4.10.3 axe.js", INSTALL="no")
+    assert code == 2 and re.fullmatch(r"foc33: set-up, missing: axe-core 4\.10\.3: [^\n]+\n", said)
+    machine.program("npm", "echo 'npm error code ENOTFOUND'; exit 1")
+    code, said = machine.run("tools/setup/axe.sh 4.10.3 axe.js")
+    assert code == 2 and said.splitlines()[-1].startswith("foc33: set-up, axe-core 4.10.3: cannot be installed (npm error code ENOTFOUND); check the network")
+    assert [item.name for item in (machine.root / "build/setup").iterdir() if item.is_dir()] == [] # nothing is left
 
 
 def test_make_passes_the_wish_on():
