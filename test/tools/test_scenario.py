@@ -213,7 +213,8 @@ def test_every_scenario_of_the_project_is_valid_and_expects_something_and_there_
     items = [load(name) for name in paths.names(paths.SCENARIOS)]
     assert [item.title for item in items if not item.expectations] == []
     assert {define for item in items for define in item.defines if not define.startswith("APP=")} == {"OPEN_LOOP_FUNCTIONING", "TUNING", "TORQUE_MODE",
-        "BIDIRECTIONAL_SPEED", "TORQUE_PROFILE", "SNAPSHOT", "DIRECTION_INPUT_USED=1", "FAULT_OUTPUT_USED=1", "RUNNING_OUTPUT_USED=1", "BRAKE_CHOPPER_V=26"}
+        "BIDIRECTIONAL_SPEED", "TORQUE_PROFILE", "SNAPSHOT", "DIRECTION_INPUT_USED=1", "FAULT_OUTPUT_USED=1", "RUNNING_OUTPUT_USED=1", "BRAKE_CHOPPER_V=26",
+        "MOTOR_NTC_USED=1", "BRIDGE_NTC_USED=1", "PULSE_DUTY=1"}
     faults = {expectation.name for item in items for expectation in item.expectations if type(expectation).__name__ == "FaultExpectation"}
     assert {"OVERCURRENT_HW", "OVERCURRENT_SW", "OVERVOLTAGE", "UNDERVOLTAGE", "START_FAILED", "STALL", "LOST_LOCK",
             "ISR_OVERRUN"} <= faults
