@@ -222,7 +222,7 @@ static uint16_t kept_keep(void)
     if (!kept_may_be_used()) {
         return KEPT_RESULT_RANGE;
     }
-    kept_number++;
+    kept_number = (uint16_t)(kept_number + 1u); /* wraps */
     kept_write_copy(OTHER_PAGE(last));
     if (kept_judge(OTHER_PAGE(last)) == (uint16_t)KEPT_KEPT) {
         kept_write_copy(last);
