@@ -226,7 +226,7 @@ static void pulse_begins(uint16_t begin_200ns, uint16_t ticks)
 /** The next pulse begins. IC2 starts later than IC1 by less than a period, so that the end is perhaps the next one's. */
 static void pulse_is_over(uint16_t begin_200ns, uint16_t ticks)
 {
-    const uint16_t length_200ns = pulse.length_200ns, is_once = (uint16_t)(ticks - pulse.begin_ticks) <= PULSE_ONCE_ROUND_TICKS;
+    const uint16_t length_200ns = pulse.length_200ns, is_once = (uint16_t)((uint16_t)(ticks - pulse.begin_ticks) <= PULSE_ONCE_ROUND_TICKS);
     const uint16_t period_200ns = is_once ? (uint16_t)(begin_200ns - pulse.begin_200ns) : 65535u;
     if (length_200ns != 0u) {
         told_pulse_200ns = (length_200ns > period_200ns) ? (uint16_t)(length_200ns - period_200ns) : length_200ns;

@@ -131,6 +131,20 @@ enum { WALK_COMPARE,
        WALK_LEARN, /* they are the header's */
        WALK_SET /* to what a reset would bring */ };
 
+/** One value of a walk. @return it, as it is now */
+static int16_t kept_visit(uint16_t job, kept_word_t *at, uint16_t n)
+{
+    if (job == (uint16_t)WALK_LEARN) {
+        of_header[n] = (uint16_t)*at;
+    } else if (job == (uint16_t)WALK_SET) {
+        *at = (int16_t)kept_value_of(n);
+    } else if (job >= KEPT_AT) {
+        kept_write_word(job, (uint16_t)(AT_VALUES + n), (uint16_t)*at);
+    } else { /* no more */
+    }
+    return *at;
+}
+
 /** All values in their order: outside their range? other than what a reset would bring? @return their CRC, behind `start` */
 static uint16_t kept_walk(uint16_t job, uint16_t start)
 {
@@ -140,21 +154,8 @@ static uint16_t kept_walk(uint16_t job, uint16_t start)
     for (range = ranges; range != &ranges[ROWS]; range++) {
         kept_word_t *at = (kept_word_t *)(void *)&board_params + (range->place & 0xFFu);
         for (left = range->place >> 8; left != 0u; left--) {
-            int16_t value = *at;
-            if (job == (uint16_t)WALK_LEARN) {
-                of_header[n] = (uint16_t)value;
-            } else if (job >= KEPT_AT) {
-                kept_write_word(job, (uint16_t)(AT_VALUES + n), (uint16_t)value);
-            } else { /* no more */
-            }
-            if ((uint16_t)value != kept_value_of(n)) {
-                if (job == (uint16_t)WALK_SET) {
-                    value = (int16_t)kept_value_of(n);
-                    *at = value;
-                } else {
-                    unsaved++;
-                }
-            }
+            const int16_t value = kept_visit(job, at, n);
+            unsaved = (uint16_t)(unsaved + ((uint16_t)value != kept_value_of(n)));
             if (value < range->least || value > range->most) {
                 kept_wrong = 1;
             }
