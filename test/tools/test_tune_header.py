@@ -136,4 +136,6 @@ def test_every_assumption_of_the_simulator_and_every_relation_has_a_row():
     files = (paths.ROOT / "tools" / name for name in ("cpu_33f/iss_assumptions.h", "chip/chip_assumptions.h"))
     assert tables.simulator().count("\n| `") == "".join(path.read_text(encoding="utf-8") for path in files).count("    X(")
     rows = param_rows.TABLE.read_text(encoding="utf-8").partition("#define PARAM_RELATION_ALONE")[2]
-    assert tables.params().count("\n- ") == rows.partition("#define PARAM_INVKFI_FITS")[0].count("    X(") + 5
+    rows = rows.partition("#define PARAM_INVKFI_FITS")[0]
+    for_each_sensor = rows.partition("#define PARAM_RELATION_HEAT")[2].partition("#define PARAM_RELATION_REST")[0].count("    X(")
+    assert for_each_sensor == 3 and tables.params().count("\n- ") == rows.count("    X(") + for_each_sensor + 5
