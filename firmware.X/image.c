@@ -3,6 +3,7 @@
 #include "firmware/board/application.c"
 #include "firmware/board/firmware.c"
 #include "firmware/board/isr.c"
+#include "firmware/board/kept.c"
 #include "firmware/board/main.c"
 #include "firmware/board/peripherals.c"
 #include "firmware/board/reset.c"
