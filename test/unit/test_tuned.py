@@ -14,7 +14,10 @@ EXACT = {"3", "10", "12", "60", "1000", "2000", "3.14159265", "1.73205081", "0.0
          "33554432", "67108864"}
 # The ends of a format's word, with room for what is added; a clock; a schedule. The line has the name that it stands for.
 NAMED = {"SPEED_UNIT_ERPM": "32000", "PWM_TICK_SEC": "0.000000025", "DEFER_BELOW_SEC": "0.00004", "CURRENT_PI_SHIFT": "10", "PARAM_LS_RAISED": "1.2",
-         "PARAM_LOAD_FROM": "16000", "PARAM_INNOVATION_MAX": "16000", "PARAM_ACCEL_SHIFT": " ".join(map(str, range(16))), "PARAM_PROTECTION_INIT": "32700 0.99", "TUNING_STEP_Q16": "1", "PARAM_18": ""}
+         "PARAM_LOAD_FROM": "16000", "PARAM_INNOVATION_MAX": "16000", "PARAM_ACCEL_SHIFT": " ".join(map(str, range(16))), "PARAM_PROTECTION_INIT": "32700 0.99", "TUNING_STEP_Q16": "1",
+         # The share's rounding; an NTC's table and its exponential function, Kelvin and 25 degrees Celsius.
+         "CHOPPER_SHARE_Q10": "0.01", "NTC_LEAST_C": "40", "NTC_NODES": "13", "NTC_MOST_C": "152", "PARAM_NTC_EXP_TOP": "120",
+         "PARAM_NTC_SHARE": "298.15 273.15"}
 COMMENT = re.compile(r"/\*.*?\*/|\"[^\"]*\"", re.DOTALL)
 
 
@@ -36,7 +39,7 @@ def numbers(text: str) -> list[str]:
 
 def untold(text: str) -> list[str]:
     """The numbers of a header that are neither exact nor named."""
-    return [f"{name}: {number}" for name, body in macros(text) if name != "PARAM_18" for number in numbers(body)
+    return [f"{name}: {number}" for name, body in macros(text) if name != "PARAM_18_OF" for number in numbers(body)
             if not is_format(number) and (number.removesuffix(".0") not in EXACT) and number.removesuffix(".0") not in NAMED.get(name, "").split()]
 
 
