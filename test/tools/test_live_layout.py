@@ -240,8 +240,7 @@ def test_triggered_is_said_of_a_trace_and_goes_when_the_next_one_is_awaited(page
     page.click("[data-fault=blocked]") # the angle stands, and no trigger comes
     page.state("FAULT")
     page.wait(f"return {status} === 'waits for its trigger'", "it still says that it has triggered", 3.0)
-    inside(page, "views.scope.set({ setup: views.scope.setup, status: 'no connection: x' })")
-    assert "bad" in page.one("#scope-status").get_attribute("class")
+    assert "bad" in inside(page, "views.scope.set({ setup: views.scope.setup, status: 'no connection: x' }); by('scope-status').className")
     assert inside(page, "views.scope.draw(views.scope.trace); [by('scope-status').textContent, by('scope-status').className]") == ["triggered", ""]
     page.click("[data-mode=stop]")
     page.click("[data-fault=blocked]")
