@@ -64,6 +64,18 @@ static void board_ms(uint16_t count)
     }
 }
 
+/** A pass of the loop after so many control interrupts, in each of which the converter has sampled its input. */
+static void pass_after(uint16_t periods)
+{
+    while (periods-- != 0u) {
+        ADC1BUF0 = (AD1CHS0 == 8u) ? 0x0000u : ground_reads_raw;
+        a_period();
+    }
+    IFS0bits.T1IF = 1;
+    firmware_background();
+    transmitter_takes();
+}
+
 /** In this many milliseconds the defect is found, as this test's, and the outputs are off. */
 static void finds_it(selftest_t test, uint16_t most_ms, const char *what)
 {
@@ -344,6 +356,19 @@ void test_a_converter_that_does_not_read_ground_is_found_in_STOPPED_only(void)
     board_ms(1200); /* the potentiometer is needed */
     TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
     TEST_ASSERT_EQUAL_HEX16(BOARD_AD1CHS0, AD1CHS0);
+}
+
+void test_a_pass_that_is_late_and_the_next_at_once_accuse_no_register(void)
+{
+    for (uint16_t parity = 0; parity < 2u; parity++) {
+        setUp();
+        pass_after((uint16_t)(20u * (parity + 1u)));
+        for (uint32_t n = 0; n < 40ul * ADC_EVERY_MS; n++) {
+            pass_after((n & 1u) ? 1u : 39u);
+        }
+        TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    }
 }
 
 void test_a_start_in_the_middle_of_the_converters_test_forgets_it(void)
