@@ -13,6 +13,7 @@
 #include <string.h>
 
 #include "interrupts.h"
+#include "press_s2.h"
 #include "unity.h"
 
 static void bus_volts(float bus_v)
@@ -43,14 +44,6 @@ static void board_ms(uint16_t ms)
 }
 
 /* S2 down and up again, both for longer than it bounces. */
-static void press_s2(void)
-{
-    PORTAbits.RA8 = 0;
-    board_ms(40);
-    PORTAbits.RA8 = 1;
-    board_ms(10);
-}
-
 /** State, fault and override: 0 all off, 0x0015 the low sides, 0x3F00 PWM. */
 static void expect(drive_state_t state, drive_fault_t fault, uint16_t override)
 {

@@ -23,6 +23,7 @@
 #include "firmware/drive/modes/modes.c"
 
 #include "interrupts.h"
+#include "press_s2.h"
 #include "transmitter.h"
 #include "unity.h"
 
@@ -75,14 +76,6 @@ static void board_ms(uint16_t ms)
             transmitter_takes();
         }
     }
-}
-
-static void press_s2(void)
-{
-    PORTAbits.RA8 = 0;
-    board_ms(40);
-    PORTAbits.RA8 = 1;
-    board_ms(10);
 }
 
 static void run_motor(void)

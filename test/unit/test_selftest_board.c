@@ -22,6 +22,7 @@ static uint16_t stuck_bits;
 #include <string.h>
 
 #include "interrupts.h"
+#include "press_s2.h"
 #include "transmitter.h"
 #include "unity.h"
 
@@ -93,14 +94,6 @@ static void finds(selftest_t test, uint16_t most_ms, const char *what)
     finds_it(test, most_ms, what);
     TEST_ASSERT_EQUAL_UINT16_MESSAGE(FAULT_SELFTEST, board_drive.fault, what);
     TEST_ASSERT_EQUAL_UINT16_MESSAGE(DRIVE_FAULT, board_drive.state, what);
-}
-
-static void press_s2(void)
-{
-    PORTAbits.RA8 = 0;
-    board_ms(40);
-    PORTAbits.RA8 = 1;
-    board_ms(10);
 }
 
 static void run_motor(void)
