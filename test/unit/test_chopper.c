@@ -49,6 +49,14 @@ void test_the_resistor_is_on_from_the_threshold_and_off_two_per_cent_below(void)
     TEST_ASSERT_EQUAL_UINT16(1, step(52.7F, 1)); /* the end of the converter */
 }
 
+void test_a_count_below_the_lower_level_is_off_and_the_level_itself_is_not(void)
+{
+    TEST_ASSERT_EQUAL_UINT16(1, bus_chopper(&chopper, CHOPPER_ON_Q15, ++now));
+    TEST_ASSERT_EQUAL_UINT16(1, bus_chopper(&chopper, CHOPPER_OFF_Q15, ++now));
+    TEST_ASSERT_EQUAL_UINT16(0, bus_chopper(&chopper, (int16_t)(CHOPPER_OFF_Q15 - 1), ++now));
+    TEST_ASSERT_EQUAL_UINT16(0, bus_chopper(&chopper, (int16_t)(CHOPPER_ON_Q15 - 1), ++now));
+}
+
 void test_a_cold_resistor_bears_its_share_of_the_mean_s_time_at_once_and_then_rests_for_an_eighth_of_it(void)
 {
     const uint32_t on = periods_to(0, 28.0F, 40u * PERIODS_PER_SEC);

@@ -144,6 +144,23 @@ void test_first_sample_counts_in_full_and_the_others_are_smoothed(void)
     TEST_ASSERT_INT16_WITHIN(16, 25 * 16, drive.heat.motor.celsius_q4);
 }
 
+void test_the_trip_level_itself_is_hot_and_so_is_the_level_ten_kelvin_below_it_until_it_has_been_passed(void)
+{
+    static const struct {
+        uint16_t before;
+        int16_t above_q4; /* the trip level, above the temperature */
+        uint16_t after;
+    } cases[] = { { 0, 0, 1 }, { 0, 1, 0 }, { 1, HEAT_COOLER_Q4, 1 }, { 1, HEAT_COOLER_Q4 + 1, 0 } };
+    (void)samples_of_motor(60.0, SETTLED);
+    EACH(n, cases) {
+        ntc_params_t its = params.motor_ntc;
+        its.trip_q4 = (int16_t)(drive.heat.motor.celsius_q4 + cases[n].above_q4);
+        drive.heat.motor.is_hot = cases[n].before;
+        ntc_sample(&drive.heat.motor, &its, converted(motor_share(60.0)));
+        TEST_ASSERT_EQUAL_UINT16(cases[n].after, drive.heat.motor.is_hot);
+    }
+}
+
 /* ---- derating ---- */
 
 void test_current_falls_from_all_to_a_fifth_between_derate_and_trip(void)
