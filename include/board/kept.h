@@ -125,6 +125,7 @@ typedef struct {
 #define KEPT_NOT(R, min, max)
 
 #if PARAMS_KEPT
+/** Of this board; a client finds it by its name. */
 extern kept_t kept_command;
 
 /** At the start, before the drive: the kept values into board_params, if there are any that may be used. */
