@@ -24,7 +24,7 @@ PRODUCT = ("TORQUE_MODE", "PARAMS_IN_RAM", "PARAMS_KEPT", "APP_SERIAL", "APP_PUL
 COMBINED = [PRODUCT, ("TORQUE_MODE", "BIDIRECTIONAL_SPEED"), ("TUNING", "SNAPSHOT"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED"),
             ("TUNING", "SELFTEST_OFF"), ("TORQUE_PROFILE", "BIDIRECTIONAL_SPEED", "TORQUE_MODE"),
             ("TORQUE_MODE", "BIDIRECTIONAL_SPEED", "SCOPE"), ("OPEN_LOOP_FUNCTIONING", "BIDIRECTIONAL_SPEED", "SNAPSHOT")]
-ON_TARGET = ("__XC16__",)
+ON_TARGET = ("__XC16__", "PARAMS_IN_RAM", "PARAMS_KEPT")
 GCC_FLAGS = """-std=gnu99 -O2 -Wall -Wextra -Wconversion -Wsign-conversion -Wshadow -Wundef -Wpointer-arith -Wcast-qual -Wcast-align
     -Wstrict-prototypes -Wmissing-prototypes -Wswitch-default -Wlogical-op -Wduplicated-cond -Wduplicated-branches -Wvla -Wtype-limits
     -Wfloat-equal -Wnull-dereference -Werror -c -o /dev/null""".split()
