@@ -78,9 +78,9 @@ current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, spe
     return (int16_t)((speed_current_q26(run, p, target_erpm) + 4096) >> 13);
 }
 
-uint16_t speed_swings(const drive_control_t *c)
+uint16_t speed_swings(const drive_run_t *run)
 {
-    return (uint16_t)(c->swing_steps > 2u * SPEED_SWING_STEPS);
+    return (uint16_t)(run->control.swing_steps > 2u * SPEED_SWING_STEPS);
 }
 
 /** Takes a step of the trim into the memory of swings. @param far 1: the error is large */
@@ -88,7 +88,7 @@ static void speed_remember_swing(drive_control_t *c, int16_t error, uint16_t far
 {
     if (far && (error ^ c->swung_erpm) < 0) {
         c->swung_erpm = error;
-        c->swing_steps = (uint16_t)((c->swing_steps > 3u * SPEED_SWING_STEPS) ? 4u * SPEED_SWING_STEPS : c->swing_steps + SPEED_SWING_STEPS);
+        c->swing_steps = (uint16_t)((c->swing_steps < 3u * SPEED_SWING_STEPS) ? c->swing_steps + SPEED_SWING_STEPS : c->swing_steps);
     } else if (c->swing_steps != 0u) {
         c->swing_steps--;
     } else { /* as a rule */
@@ -109,11 +109,14 @@ void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_e
     const int16_t most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
     const uint16_t far = (uint16_t)(qm_abs(error) > (qm_abs(before_erpm) >> SPEED_TRIM_ERROR_SHIFT));
     int32_t trim_q26 = c->iq_trim_q26;
+    uint16_t swings;
     speed_remember_swing(c, error, far);
-    if (c->reference_erpm == before_erpm && (speed_swings(c) || (!far && speed_is_calm(run, iq_q13)))) {
-        trim_q26 += (qm_mulss(error, p->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT;
-    } else {
+    swings = speed_swings(run);
+    if (c->reference_erpm != before_erpm || (!swings && (far || !speed_is_calm(run, iq_q13)))) {
         trim_q26 -= trim_q26 >> SPEED_TRIM_LEAK_SHIFT;
+    } else if (swings || qm_mulss(run->observer.innovation_erpm, error) >= 0) { /* else the observer's load moves against it by itself */
+        trim_q26 += (qm_mulss(error, p->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT;
+    } else { /* it waits */
     }
     c->iq_trim_q26 = qm_clamp_hi(trim_q26, (int16_t)-most_q10, most_q10);
 }

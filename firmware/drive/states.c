@@ -155,10 +155,10 @@ void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
     case DRIVE_CATCH: next = (uint16_t)catch_pass(d, p); break;
     case DRIVE_FAULT:
     case DRIVE_BRAKE:
-    default: /* without a fault when the background raised one while it was cleared here */
+    default: /* without a fault when the background raised one while it was cleared here; where a bit of it has flipped, its copy knows */
         if (drive_shorts(d)) {
             next = (uint16_t)speed_brake_step(d, p);
-        } else if ((d->command.clear_fault && !heat_holds(d)) || d->fault == (uint16_t)FAULT_NONE) {
+        } else if ((d->command.clear_fault && !heat_holds(d)) || (d->fault == (uint16_t)FAULT_NONE && SELFTEST_KEPT(d, fault, FAULT_NONE))) {
             calibration_restart(&d->calibration);
             next = (uint16_t)drive_clear_fault(d);
         }
