@@ -8,7 +8,7 @@ import time
 import pytest
 from support import command, refused
 
-from tools.common import checksum
+from tools.common import checksum, paths
 from tools.common.errors import UserError
 from tools.docs import figures, readme
 from tools.docs.figures import BLOCKS, Part
@@ -213,7 +213,7 @@ def page(tmp_path, monkeypatch):
     monkeypatch.setattr(readme, "SOURCES", {"fast": Source(("run SCENARIO=fast",), takes="seconds"), "long": Source(("sweep",))})
     monkeypatch.setattr(readme, "checksum", NOW.get)
     made: list[str] = []
-    monkeypatch.setattr(readme, "make", made.append)
+    monkeypatch.setattr(readme, "make", lambda command, counts: made.append(command))
 
     def run(*arguments: str) -> tuple[int, str]:
         return readme.run(readme.parser().parse_args(list(arguments))), (tmp_path / "README.md").read_text()
@@ -266,7 +266,7 @@ def test_rows_of_one_name_are_compared_one_by_one(page, tmp_path, capsys, monkey
 
 
 def test_a_command_that_fails_fails_the_check_and_keeps_the_page(page, monkeypatch, capsys):
-    def fails(name: str) -> None:
+    def fails(name: str, counts: bool) -> None:
         raise UserError(f"make {name} fails: why")
     monkeypatch.setattr(readme, "make", fails)
     assert page("--check") == (1, PAGE) and "foc33: make run SCENARIO=fast fails: why" in capsys.readouterr().err
@@ -322,6 +322,20 @@ def test_without_a_compiler_the_check_says_what_it_leaves_out(page, monkeypatch,
     assert "not checked: size, cycles, longest path" in capsys.readouterr().out
     with pytest.raises(UserError, match="^'fast' needs Microchip's compiler"):
         page("fast")
+
+
+def test_a_sweep_whose_table_counts_what_holds_is_a_result_with_rows_that_do_not(monkeypatch, tmp_path, capsys):
+    (tmp_path / "build").mkdir()
+    (tmp_path / "Makefile").write_text("pulse:\n\t@echo '43 of 90 expectations hold'; echo 'foc33: pulse: got swing' >&2; exit 1\n"
+                                       "broken:\n\t@echo 'foc33: no such motor' >&2; exit 1\n", encoding="utf-8")
+    monkeypatch.setattr(readme, "ROOT", tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(paths.ROOT))
+    readme.make("pulse", counts=True)
+    assert "43 of 90 expectations hold" in capsys.readouterr().out
+    with pytest.raises(UserError, match="got swing"):
+        readme.make("pulse")
+    with pytest.raises(UserError, match="no such motor"):
+        readme.make("broken", counts=True)
 
 
 def test_a_target_that_fails_is_one_line_with_its_own_words_and_knows_nothing_of_this_make(monkeypatch, capsys):
