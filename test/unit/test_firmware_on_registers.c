@@ -43,7 +43,6 @@ static void board_ms(uint16_t ms)
     }
 }
 
-/* S2 down and up again, both for longer than it bounces. */
 /** State, fault and override: 0 all off, 0x0015 the low sides, 0x3F00 PWM. */
 static void expect(drive_state_t state, drive_fault_t fault, uint16_t override)
 {

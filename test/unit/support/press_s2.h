@@ -8,6 +8,7 @@
 /** The test's own: the board runs for so many milliseconds. */
 static void board_ms(uint16_t count);
 
+/** Down and up again, both for longer than it bounces. */
 static void press_s2(void)
 {
     PORTAbits.RA8 = 0;
