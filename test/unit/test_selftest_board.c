@@ -364,6 +364,20 @@ void test_a_pass_that_is_late_and_the_next_at_once_accuse_no_register(void)
     }
 }
 
+void test_the_converter_s_test_ends_with_the_third_period_and_not_before(void)
+{
+    uint16_t n = 0;
+    do {
+        pass_after(20);
+    } while (AD1CHS0 != BOARD_AN_OFF && ++n <= 2u * ADC_EVERY_MS);
+    TEST_ASSERT_EQUAL_HEX16(BOARD_AN_OFF, AD1CHS0);
+    pass_after(2);
+    TEST_ASSERT_EQUAL_HEX16(BOARD_AN_OFF, AD1CHS0);
+    pass_after(1);
+    TEST_ASSERT_EQUAL_HEX16(BOARD_AD1CHS0, AD1CHS0);
+    TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
+}
+
 void test_a_start_in_the_middle_of_the_converters_test_forgets_it(void)
 {
     uint16_t n;
