@@ -80,6 +80,10 @@ class Living:
         """Somebody works at it."""
         self.maker.call(lambda: self.board.act(command)).result(5)
 
+    def pace(self, pace: float) -> None:
+        """Asked of the board's thread, like the page does."""
+        self.maker.call(lambda: self.maker.set_pace(pace)).result(5)
+
     def click_s2(self) -> None:
         self.do(press="S2")
         self.do(release="S2")
@@ -95,6 +99,7 @@ class Living:
     def close(self) -> None:
         self.board.end()
         self.maker.end()
+        assert self.maker.error is None, self.maker.error
 
 
 class Served:

@@ -66,9 +66,9 @@ def test_the_page_starts_the_motor_gives_it_a_target_and_stops_it(desk):
     assert now["i_q_a"] == pytest.approx(desk.board.board.get("fw.i_q_a"), abs=0.1)
     assert now["v_q_v"] == pytest.approx(desk.board.board.get("fw.v_q_v"), rel=0.1)
     begun_s = desk.board.time_s
-    desk.maker.set_pace(2.0)
+    desk.pace(2.0)
     until(lambda: desk.board.time_s > begun_s + 2.5, "no time passes") # longer than a lease
-    desk.maker.set_pace(1.0)
+    desk.pace(1.0)
     assert desk.frame()["state"] == "CLOSED"
     desk.page.act({"stop": True})
     desk.state("STOPPED")
@@ -126,9 +126,9 @@ def test_csv_is_what_was_read(desk):
 
 def test_a_board_that_falls_silent_is_told(desk):
     until(lambda: not desk.frame()["silent"], "it is not heard")
-    desk.maker.set_pace(0.0001)
+    desk.pace(0.0001)
     until(lambda: desk.frame()["silent"], "nobody says it", 30.0)
-    desk.maker.set_pace(1.0)
+    desk.pace(1.0)
     until(lambda: not desk.frame()["silent"], "it does not come back", 30.0)
 
 

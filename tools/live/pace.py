@@ -72,6 +72,7 @@ class Pacemaker:
                 self.asked.get_nowait()[1].set_exception(UserError("the board has stopped"))
 
     def set_pace(self, pace: float) -> None:
+        """To be asked by call() while the board lives."""
         self.board.paced(pace)
         self.pace = pace
         self.measured.clear()
