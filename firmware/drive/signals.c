@@ -61,16 +61,25 @@ static void signals_add_along(signals_beat_t *sum, int16_t x, sincos_t at)
     sum->sine += qm_hi(2 * qm_mulss(x, at.sin));
 }
 
-/** Takes a step into the sums. */
-static void signals_gather(signals_evidence_t *e, const drive_t *d, uint16_t unexplained)
+/** Takes an innovation into the sums. That of a rotor which all but stands turns with no pointer. */
+static void signals_gather_beats(signals_evidence_t *e, const drive_t *d, int16_t x)
 {
-    const int16_t x = d->run.observer.innovation_erpm;
     const sincos_t at = d->frame;
     sincos_t double_angle;
+    if (qm_abs(observer_speed(&d->run.observer)) < (qm_abs(d->run.control.reference_erpm) >> SIGNALS_STANDS_SHIFT)) {
+        return;
+    }
     double_angle.cos = (int16_t)(qm_mulhi(at.cos, at.cos) - qm_mulhi(at.sin, at.sin)); /* half */
     double_angle.sin = (int16_t)(2 * qm_mulhi(at.cos, at.sin));
     signals_add_along(&e->once, x, at);
     signals_add_along(&e->twice, (int16_t)(2 * qm_limit(x, 16383)), double_angle);
+}
+
+/** Takes a step into the sums. */
+static void signals_gather(signals_evidence_t *e, const drive_t *d, uint16_t unexplained)
+{
+    const int16_t x = d->run.observer.innovation_erpm;
+    signals_gather_beats(e, d, x);
     e->size += (uint16_t)qm_abs(x);
     e->checks++;
     e->unexplained = (uint16_t)(e->unexplained + unexplained);
@@ -86,8 +95,8 @@ static uint32_t signals_beat(const signals_beat_t *sum)
 /** 1 where only a wrong signal can be behind it. */
 static uint16_t signals_prove(const signals_evidence_t *e, const drive_params_t *p)
 {
-    return (uint16_t)(signals_beat(&e->once) + signals_beat(&e->twice) > e->size / 2u + e->size / 8u || e->size > qm_muluu(e->checks, p->load_erpm)
-                      || e->unexplained > e->checks / 2u);
+    const uint32_t once = signals_beat(&e->once), twice = signals_beat(&e->twice), least = e->size / 2u + e->size / 8u;
+    return (uint16_t)(once > least || twice > least || e->size > qm_muluu(e->checks, p->load_erpm) || e->unexplained > e->checks / 2u);
 }
 
 /** Begins anew; member by member, for the longest path knows of no loop over bytes. */

@@ -78,26 +78,51 @@ current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, spe
     return (int16_t)((speed_current_q26(run, p, target_erpm) + 4096) >> 13);
 }
 
-/** 1 where the observer's load moves against the error by itself.
- *  @param seen,speed the estimator's speed and the observer's @param error where it is 0 the trim asks in vain */
-static uint16_t speed_load_moves_against(speed_erpm_t seen, speed_erpm_t speed, int16_t error)
+uint16_t speed_swings(const drive_run_t *run)
 {
+    return (uint16_t)(run->control.swing_steps > 2u * SPEED_SWING_STEPS);
+}
+
+/** Takes a step of the trim into the memory of swings. @param far 1: the error is large */
+static void speed_remember_swing(drive_control_t *c, int16_t error, uint16_t far)
+{
+    if (far && (error ^ c->swung_erpm) < 0) {
+        c->swung_erpm = error;
+        c->swing_steps = (uint16_t)((c->swing_steps < 3u * SPEED_SWING_STEPS) ? c->swing_steps + SPEED_SWING_STEPS : c->swing_steps);
+    } else if (c->swing_steps != 0u) {
+        c->swing_steps--;
+    } else { /* as a rule */
+    }
+}
+
+/** 1 where nothing changes fast and no limit is reached. */
+static uint16_t speed_is_calm(const drive_run_t *run, current_q13_t iq_q13)
+{
+    const drive_control_t *c = &run->control;
+    return (uint16_t)(observer_gate_is_closed(&run->observer) && qm_abs(iq_q13) < c->iq_limit_q13 && qm_abs(c->v_q14.q) < c->vq_limit_q14);
+}
+
+/** 1 where the observer's load moves against the error by itself: while a load grows, the error is the observer's. */
+static uint16_t speed_load_moves_against(const drive_run_t *run, int16_t error)
+{
+    const speed_erpm_t seen = estimator_speed(&run->estimator), speed = observer_speed(&run->observer);
     return (uint16_t)((error > 0) ? seen < speed : seen > speed);
 }
 
 void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_erpm, current_q13_t iq_q13)
 {
     drive_control_t *c = &run->control;
-    const speed_erpm_t speed = observer_speed(&run->observer);
-    const int16_t error = qm_sub_limited(c->reference_erpm, speed), most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
+    const uint16_t swings = speed_swings(run);
+    const int16_t error = qm_sub_limited(c->reference_erpm, swings ? estimator_speed(&run->estimator) : observer_speed(&run->observer));
+    const int16_t most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
+    const uint16_t far = (uint16_t)(qm_abs(error) > (qm_abs(before_erpm) >> SPEED_TRIM_ERROR_SHIFT));
     int32_t trim_q26 = c->iq_trim_q26;
-    if (c->reference_erpm == before_erpm && qm_abs(error) <= (qm_abs(before_erpm) >> SPEED_TRIM_ERROR_SHIFT)
-        && observer_gate_is_closed(&run->observer) && qm_abs(iq_q13) < c->iq_limit_q13 && qm_abs(c->v_q14.q) < c->vq_limit_q14) {
-        if (!speed_load_moves_against(estimator_speed(&run->estimator), speed, error)) {
-            trim_q26 += (qm_mulss(error, c->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT;
-        }
-    } else {
+    speed_remember_swing(c, error, far);
+    if (c->reference_erpm != before_erpm || (!swings && (far || !speed_is_calm(run, iq_q13)))) {
         trim_q26 -= trim_q26 >> SPEED_TRIM_LEAK_SHIFT;
+    } else if (swings || !speed_load_moves_against(run, error)) {
+        trim_q26 += (qm_mulss(error, swings ? p->speed_kp_q13 : c->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT;
+    } else { /* it waits */
     }
     c->iq_trim_q26 = qm_clamp_hi(trim_q26, (int16_t)-most_q10, most_q10);
 }

@@ -133,6 +133,12 @@ static void idle_move(drive_t *d, drive_state_t next)
     drive_enter(d, next);
 }
 
+/** 1 where it is cleared, and without a fault: the background raised one while it was cleared here. Where a bit of it has flipped, its copy knows. */
+static uint16_t states_fault_is_over(const drive_t *d)
+{
+    return (uint16_t)((d->command.clear_fault && !heat_holds(d)) || (d->fault == (uint16_t)FAULT_NONE && SELFTEST_KEPT(d, fault, FAULT_NONE)));
+}
+
 void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 {
     uint16_t next = d->state;
@@ -155,10 +161,10 @@ void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
     case DRIVE_CATCH: next = (uint16_t)catch_pass(d, p); break;
     case DRIVE_FAULT:
     case DRIVE_BRAKE:
-    default: /* without a fault when the background raised one while it was cleared here */
+    default:
         if (drive_shorts(d)) {
             next = (uint16_t)speed_brake_step(d, p);
-        } else if ((d->command.clear_fault && !heat_holds(d)) || d->fault == (uint16_t)FAULT_NONE) {
+        } else if (states_fault_is_over(d)) {
             calibration_restart(&d->calibration);
             next = (uint16_t)drive_clear_fault(d);
         }

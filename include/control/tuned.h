@@ -39,7 +39,8 @@
 #define SPEED_TRIM_SHIFT 8          /* [shift] the trim takes 1/256 of the error in half of its steps, 16 periods apart: 2.4 rad/s at 20 kHz | lowspeed */
 #define SPEED_TRIM_LEAK_SHIFT 7     /* [shift] and is forgotten in a tenth of a second | loadsteps */
 #define SPEED_TRIM_MOST_SHIFT 3     /* [shift] an eighth of the largest current at most | lowspeed */
-#define SPEED_TRIM_ERROR_SHIFT 3    /* [shift] an error beyond an eighth of the speed is no rest | loadsteps */
+#define SPEED_TRIM_ERROR_SHIFT 4    /* [shift] an error beyond a sixteenth of the speed is no rest | loadsteps */
+#define SPEED_SWING_STEPS 150u      /* [steps] of 16 periods, 0.12 s at 20 kHz, that a swing beyond it to either side is remembered | pulse */
 
 /* ---- Field weakening and d current ---- */
 #define FIELDWEAK_TRIM_STEP 4       /* [Q13 A] d current that the voltage feedback gives back every 16 periods | run SCENARIO=demo */
@@ -118,6 +119,7 @@
 /* ---- Held shaft ---- */
 #define HELD_DOUBTS_MOST 5u   /* [1] steps of 16 periods, below half the reference, that look like a held rotor: then the angle stands | loadsteps */
 #define HELD_DOUBTS_FAR 3u    /* [1] below an eighth of the reference a step counts as many | held */
+#define HELD_DOUBTS_SWINGS 40u /* [1] and where the speed swings, for then it is so slow in each turn | pulse */
 #define HELD_LAG_SHIFT 4      /* [shift] of what the back-EMF's filter is behind 1/16 is forgotten a step | held */
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
 #define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
@@ -141,6 +143,7 @@
 #define WRONG_SEC 0.1               /* [s] of innovations that no load explains | run SCENARIO=fault_open_phase */
 #define IMPOSSIBLE_SEC 0.25         /* [s] of a flux or resistance that cannot be | campaign */
 #define SIGNALS_UNEXPLAINED 2u      /* [steps] so many wrong innovations is an unexplained voltage | run SCENARIO=fault_open_phase */
+#define SIGNALS_STANDS_SHIFT 2      /* [shift] below a quarter of the reference an innovation is in time with nothing | pulse */
 #define SIGNALS_OPEN_SHIFT 2        /* [shift] an open phase carries less than a quarter of its share, in both rules | run SCENARIO=fault_open_phase */
 #define SIGNALS_BLUR_SHIFT 2        /* [shift] dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below | run SCENARIO=stop_from_top */
 #define PROBE_WAIT_STEPS 13         /* [32 periods] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */

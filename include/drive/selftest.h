@@ -19,11 +19,15 @@ typedef struct {
 /** Goes with every write of a field that is kept twice. */
 #define SELFTEST_KEEP(d, field, value) ((d)->selftest.field = (uint16_t) ~(uint16_t)(value))
 
+/** 1 where the copy of such a field is that of a value. */
+#define SELFTEST_KEPT(d, field, value) ((d)->selftest.field == (uint16_t) ~(uint16_t)(value))
+
 /** A slot, or its half, has come to its end. */
 #define SELFTEST_MARK(d, phase) ((d)->selftest.phases = (uint16_t)((d)->selftest.phases + (phase)))
 #else
 #define SELFTEST_STATE
 #define SELFTEST_KEEP(d, field, value) ((void)0)
+#define SELFTEST_KEPT(d, field, value) 1
 #define SELFTEST_MARK(d, phase) ((void)(phase))
 #endif
 

@@ -22,11 +22,17 @@ void speed_schedule(drive_run_t *run, const drive_params_t *p);
 /** The same in whole counts. */
 current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm);
 
-/** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer, that acts while the
- *  reference stands, nothing changes fast and no limit is reached, and is forgotten otherwise. It waits in the steps in which the observer's
- *  load moves against the error by itself: while a load grows, the error is the observer's.
+/** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer. It acts while the reference
+ *  stands, nothing changes fast and no limit is reached, but waits in the steps in which the observer's load moves against the error by itself: while a
+ *  load grows, the error is the observer's. While the speed swings it acts whatever else happens, for only an integral of all of the error holds the
+ *  mean; its gain is constant then, and its speed the estimator's, for the controller's gain and the observer's rate change over a swing. It is
+ *  forgotten otherwise.
  *  @param before_erpm the reference 16 periods ago @param iq_q13 the q current that is asked for */
 void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_erpm, current_q13_t iq_q13);
+
+/** 1 while the speed swings about its reference, as under a load that pulses with the shaft: it was far off to the other side some times, less than
+ *  SPEED_SWING_STEPS apart in the mean. A load step is one or two such times; slower swings are the loop's own, with far more inertia than the header's. */
+uint16_t speed_swings(const drive_run_t *run);
 
 /** The same step by step: what a step leaves below a whole count goes to the next, for a count can turn a light rotor out of its speed. */
 current_q13_t speed_current_step(drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm);

@@ -225,6 +225,16 @@ void test_resistance_that_has_risen_rises_to_its_bound_and_not_beyond(void)
     }
 }
 
+void test_a_speed_that_swings_is_asked_later(void)
+{
+    at(1, FAST_ERPM, 1500, 0, 400);
+    drive.run.control.swing_steps = 2u * SPEED_SWING_STEPS + 1u;
+    steps(HELD_DOUBTS_SWINGS - 1u);
+    TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase);
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+}
+
 void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_the_rotor_is(void)
 {
     EACH_DIRECTION(direction) {

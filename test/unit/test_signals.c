@@ -382,6 +382,41 @@ void test_five_eighths_of_the_innovations_size_in_time_with_the_electrical_angle
     }
 }
 
+void test_half_of_it_with_each_of_the_two_pointers_proves_nothing(void)
+{
+    uint16_t checks;
+    rig_closed(1, 10000);
+    drive.run.evidence.size = 200000;
+    drive.run.evidence.checks = 1000;
+    drive.run.evidence.once.cosine = -120000;
+    drive.run.evidence.twice.sine = 120000;
+    drive.frame = trig_sincos(0);
+    for (checks = 0; checks <= params.wrong_steps; checks++) {
+        drive.run.observer.wrong_steps++;
+        signals_judge(&drive, &params);
+    }
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}
+
+void test_a_rotor_that_all_but_stands_turns_with_no_pointer(void)
+{
+    rig_closed(1, 10000);
+    EACH_DIRECTION(sign) {
+        rig_speed((int16_t)(sign * 2499));
+        drive.frame = trig_sincos(0);
+        drive.run.observer.innovation_erpm = 500;
+        drive.run.observer.wrong_steps = 1;
+        signals_check(&drive, &params);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.evidence.once.cosine);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.evidence.twice.cosine);
+    }
+    TEST_ASSERT_EQUAL_UINT16(2, drive.run.evidence.checks);
+    TEST_ASSERT_EQUAL_UINT32(1000, drive.run.evidence.size);
+    rig_speed(-2500);
+    signals_check(&drive, &params);
+    TEST_ASSERT_INT32_WITHIN(2, 500, drive.run.evidence.once.cosine);
+}
+
 void test_the_innovation_that_a_load_can_make_follows_from_current_torque_inertia_and_the_observer_s_rate(void)
 {
     const double acceleration = 1.5 * 5.0 * PARAM_F(MOTOR_KPHI_V_PER_KRPM) / ROOT_OF_3 * 60.0 / (2.0 * PI * 1000.0 * 5.0)

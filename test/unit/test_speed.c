@@ -137,37 +137,124 @@ static void turn_at(int16_t observed_erpm, int16_t estimated_erpm)
     drive.run.estimator.omega_filtered_q16 = estimated_erpm * 65536L;
 }
 
-/** Trim after so many steps with this observed speed and an estimated one that is so much higher, in whole counts; the reference rests at 10000. */
-static int16_t trim_after(uint16_t steps, int16_t observed_erpm, int16_t ahead_erpm)
+/** Trim after so many steps with these speeds, in whole counts; the reference rests at 10000. Where the speed swings the gain is twice that of rest. */
+static int16_t trim_after_at(uint16_t steps, int16_t observed_erpm, int16_t estimated_erpm)
 {
+    static drive_params_t swinging;
+    swinging = params;
+    swinging.speed_kp_q13 = 16384;
     drive.run.control.speed_kp_q13 = 8192; /* a count an erpm */
     drive.run.control.vq_limit_q14 = 30000;
     while (steps-- != 0u) {
-        turn_at(observed_erpm, (int16_t)(observed_erpm + ahead_erpm));
-        speed_trim(&drive.run, &params, drive.run.control.reference_erpm, 0);
+        turn_at(observed_erpm, estimated_erpm);
+        speed_trim(&drive.run, &swinging, drive.run.control.reference_erpm, 0);
     }
     return (int16_t)(drive.run.control.iq_trim_q26 / 8192);
+}
+
+static int16_t trim_after(uint16_t steps, int16_t speed_erpm)
+{
+    return trim_after_at(steps, speed_erpm, speed_erpm);
 }
 
 void test_trim_takes_up_what_the_speed_lacks_at_rest_and_ends_at_an_eighth_of_the_current(void)
 {
     EACH_DIRECTION(sign) {
         rig_closed(1, 10000);
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after(256, (int16_t)(10000 - sign * 100), 0)); /* 1/256 a step */
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 200), trim_after(256, (int16_t)(10000 - sign * 100), (int16_t)(sign * 7)));
-        TEST_ASSERT_EQUAL_INT16(sign * 640, trim_after(10000, (int16_t)(10000 - sign * 1000), 0));
-        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 540), trim_after(256, (int16_t)(10000 + sign * 100), 0));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after(256, (int16_t)(10000 - sign * 100))); /* 1/256 a step */
+        TEST_ASSERT_EQUAL_INT16(sign * 640, trim_after(10000, (int16_t)(10000 - sign * 600)));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 540), trim_after(256, (int16_t)(10000 + sign * 100)));
     }
 }
 
 void test_trim_waits_while_the_load_s_estimate_moves_against_the_error(void)
 {
     EACH_DIRECTION(sign) {
+        const int16_t slow_erpm = (int16_t)(10000 - sign * 100);
         rig_closed(1, 10000);
-        TEST_ASSERT_EQUAL_INT16(0, trim_after(1000, (int16_t)(10000 - sign * 100), (int16_t)-sign));
-        TEST_ASSERT_TRUE(sign * trim_after(256, (int16_t)(10000 - sign * 100), (int16_t)sign) > 90);
-        TEST_ASSERT_TRUE(sign * trim_after(256, (int16_t)(10000 - sign * 100), (int16_t)-sign) > 90); /* it is kept */
+        TEST_ASSERT_EQUAL_INT16(0, trim_after_at(1000, slow_erpm, (int16_t)(slow_erpm - sign)));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after_at(256, slow_erpm, (int16_t)(slow_erpm + sign)));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after_at(256, slow_erpm, (int16_t)(slow_erpm - sign))); /* it is kept */
     }
+}
+
+/** A speed that is far off to one side and the other, so many steps each. @return the trim in whole counts */
+static int16_t trim_of_swings(uint16_t swings, uint16_t steps, int16_t low_erpm, int16_t high_erpm)
+{
+    int16_t trim = 0;
+    while (swings-- != 0u) {
+        trim = trim_after(steps, ((swings & 1u) != 0u) ? high_erpm : low_erpm);
+    }
+    return trim;
+}
+
+void test_a_speed_that_swings_is_held_in_the_mean_however_far_it_swings_and_whatever_the_gate_and_the_limits_are(void)
+{
+    int16_t mean;
+    EACH_DIRECTION(sign) {
+        rig_closed(1, 10000);
+        drive.run.control.iq_limit_q13 = 0;
+        drive.run.observer.fast_share_q15 = 32767;
+        drive.run.observer.innovation_erpm = -1;
+        TEST_ASSERT_EQUAL_INT16(0, trim_of_swings(2, 10, (int16_t)(10000 - sign * 4000), (int16_t)(10000 + sign * 4000)));
+        TEST_ASSERT_FALSE(speed_swings(&drive.run));
+        mean = trim_of_swings(10, 10, (int16_t)(10000 - sign * 4000), (int16_t)(10000 + sign * 4000));
+        TEST_ASSERT_TRUE(speed_swings(&drive.run));
+        TEST_ASSERT_INT16_WITHIN(3, mean, trim_of_swings(100, 10, (int16_t)(10000 - sign * 4000), (int16_t)(10000 + sign * 4000)));
+        mean = (int16_t)(mean + sign * 195); /* 500 steps of a mean of 50 less, 2/256 each */
+        TEST_ASSERT_INT16_WITHIN(3, mean, trim_of_swings(50, 10, (int16_t)(10000 - sign * 4100), (int16_t)(10000 + sign * 4000)));
+    }
+}
+
+void test_at_rest_the_trim_goes_by_the_observer_s_speed_and_the_gain_in_use_and_while_it_swings_by_the_estimator_s_and_a_constant_gain(void)
+{
+    EACH_DIRECTION(sign) {
+        rig_closed(1, 10000);
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after_at(256, (int16_t)(10000 - sign * 100), (int16_t)(10000 - sign * 50)));
+        drive.run.control.swing_steps = 3u * SPEED_SWING_STEPS;
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 300), trim_after_at(128, (int16_t)(10000 + sign * 100), (int16_t)(10000 - sign * 200)));
+    }
+}
+
+void test_a_load_step_is_no_swing_and_neither_are_small_errors_or_one_side(void)
+{
+    static const struct {
+        const char *what;
+        int16_t low_erpm, high_erpm;
+        uint16_t swings, steps;
+    } cases[] = {
+        { "two large errors", 5000, 15000, 2, 100 },    { "small errors", 9376, 10624, 50, 10 },   { "one side", 5000, 8000, 50, 10 },
+        { "one side that counts", 9000, 10600, 50, 10 }, { "slow swings", 5000, 15000, 50, 400 },
+    };
+    EACH(n, cases) {
+        rig_closed(1, 10000);
+        (void)trim_of_swings(cases[n].swings, cases[n].steps, cases[n].low_erpm, cases[n].high_erpm);
+        TEST_ASSERT_FALSE_MESSAGE(speed_swings(&drive.run), cases[n].what);
+    }
+}
+
+void test_swings_are_forgotten_in_an_eighth_of_a_second_and_not_remembered_for_longer(void)
+{
+    uint16_t steps = 0;
+    rig_closed(1, 10000);
+    (void)trim_of_swings(100, 10, 9000, 11000);
+    while (speed_swings(&drive.run)) {
+        (void)trim_after(1, 10000);
+        steps++;
+    }
+    TEST_ASSERT_UINT16_WITHIN(15, SPEED_SWING_STEPS, steps);
+    (void)trim_after(4u * SPEED_SWING_STEPS, 10000);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.control.swing_steps);
+}
+
+void test_swings_are_remembered_while_the_reference_moves_and_the_trim_is_forgotten_then(void)
+{
+    rig_closed(1, 10000);
+    (void)trim_of_swings(100, 10, 9000, 11000);
+    drive.run.control.iq_trim_q26 = 256L * 8192;
+    speed_trim(&drive.run, &params, 9990, 0);
+    TEST_ASSERT_EQUAL_INT32(254L * 8192, drive.run.control.iq_trim_q26);
+    TEST_ASSERT_TRUE(speed_swings(&drive.run));
 }
 
 void test_trim_is_in_the_current_and_within_its_limit(void)
@@ -188,7 +275,7 @@ void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
         int16_t v_q_q14;
     } cases[] = {
         { "at the voltage limit", 10000, 9990, 0, 0, 20000 },
-        { "reference moves", 9992, 9990, 0, 0, 0 },         { "far behind", 10000, 8749, 0, 0, 0 }, { "far ahead", 10000, 11251, 0, 0, 0 },
+        { "reference moves", 9992, 9990, 0, 0, 0 },         { "far behind", 10000, 9374, 0, 0, 0 }, { "far ahead", 10000, 10626, 0, 0, 0 },
         { "after a large innovation", 10000, 9990, 0, 32767, 0 }, { "at the current limit", 10000, 9990, 5120, 0, 0 }, { "while braking at it", 10000, 9990, -5120, 0, 0 },
     };
     EACH(n, cases) {

@@ -247,6 +247,18 @@ void test_a_cleared_fault_before_the_calibration_calibrates_anew(void)
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
 }
 
+void test_a_fault_that_loses_a_bit_in_memory_is_not_cleared_by_it(void)
+{
+    drive_raise(&drive, FAULT_OVERCURRENT_HW); /* its number has one bit */
+    drive.fault = (uint16_t)FAULT_NONE;
+    rig_tick(100);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_NONE, "the copy does not agree");
+    TEST_ASSERT_FALSE(selftest_variables_hold(&drive));
+    drive_raise(&drive, FAULT_SELFTEST); /* by the background */
+    rig_tick(100);
+    EXPECT_DRIVE(DRIVE_FAULT, FAULT_SELFTEST, "named");
+}
+
 void test_state_FAULT_never_stays_without_a_fault(void)
 {
     drive.state = (uint16_t)DRIVE_FAULT; /* the background raised while the interrupt cleared */

@@ -536,7 +536,7 @@ static NOINLINE void forget_parts(identify_t *id)
     id->cycles = 0;
 }
 
-static int16_t twice(int16_t x)
+static int16_t identify_twice(int16_t x)
 {
     return (int16_t)((x > 16383) ? 32767 : 2 * x);
 }
@@ -547,11 +547,11 @@ static void follow_gains(identify_t *id, uint32_t speed_q10)
 {
     uint16_t damps = 4;
     if (speed_q10 > LOOP_Q10) {
-        id->kp_d = twice(id->kp_d);
-        id->kp_q = twice(id->kp_q);
+        id->kp_d = identify_twice(id->kp_d);
+        id->kp_q = identify_twice(id->kp_q);
         damps = 3;
     }
-    id->ki_q = twice(twice(id->ki_q));
+    id->ki_q = identify_twice(identify_twice(id->ki_q));
     if (id->ki_q < (id->kp_q >> damps)) {
         id->ki_q = (int16_t)(id->kp_q >> damps);
     }
