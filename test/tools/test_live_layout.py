@@ -50,6 +50,12 @@ def inside(page: Page, script: str, *arguments):
     return page.run(f"return window.eval({script!r})", *arguments)
 
 
+def scope_open(page: Page, opened: bool = True, then: str = "null"):
+    """Its cursors, its spectrum and the record of a fault are shown, or not; `then` is looked at, before another trace comes."""
+    return inside(page, """((on) => { for (const id of ["scope-cursors", "scope-fft"]) { if ((by(id).getAttribute("aria-pressed") === "true") !== on) { by(id).click(); } }
+        by("scope-why").hidden = !on; return %s; })(%s)""" % (then, str(opened).lower()))
+
+
 def overlapping(places: list) -> list[tuple[str, str]]:
     """Pairs of controls that share more than their edges, without those that hold one another."""
     def shared(a, b) -> bool:
@@ -109,6 +115,23 @@ def test_the_page_fits_its_window_no_control_lies_on_another_and_curves_are_wide
         page.click("[data-mode=stop]")
     wide = inside(page, "[...views.strips.graphs, ...views.scope.graphs].map(({ graph }) => graph.getArea().w)")
     assert len(wide) >= 6 and min(wide) >= CURVE_PX
+    places = scope_open(page, then=PLACES)
+    scope_open(page, False)
+    assert overlapping(places) == [] and {"cursor-a", "cursor-b", "scope-low", "scope-png", "scope-numbers", "scope-why"} <= {place[0] for place in places}
+    assert [place for place in places if place[1] < 0 or place[3] > width + 0.5] == [] and page.run("return document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_no_control_moves_when_the_record_of_a_fault_comes_and_its_cause_has_room(page, width):
+    resized(page, width)
+    traced(page)
+    cut, moved = inside(page, """(() => { const cut = [], moved = [], v = views.scope, places = () => JSON.stringify(%s), { setup } = v;
+        v.set({ setup: v.recorder, status: "waits" });
+        const calm = places(), names = Object.keys(v.faults).filter((name) => name !== "NONE");
+        for (const fault of names) { v.draw({ ...v.trace, fault }); if (by("scope-why").scrollHeight > by("scope-why").clientHeight) { cut.push(fault); } if (places() !== calm) { moved.push(fault); } }
+        v.draw({ ...v.trace, fault: null }); v.set({ setup, status: "stop" });
+        return [cut, moved]; })()""" % PLACES)
+    assert cut == [] and moved == []
 
 
 # ---- contrast ------------------------------------------------------------------------------------------------------------------
@@ -127,7 +150,7 @@ def test_texts_have_a_contrast_of_four_and_a_half_and_edges_of_controls_of_three
     names = [dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6});", block)) for block in re.findall(r":root \{(.*?)\}", STYLE, re.S)]
     colours = names[0] | names[theme]
     assert len(names) == 2 and set(names[0]) == set(names[1]) and len(colours) > 20
-    texts = {"card": "ink soft true estimate reference d q bad", "back": "ink soft true", "field": "ink soft true", "off": "soft", "fault": "ink bad", "note": "ink",
+    texts = {"card": "ink soft true estimate reference d q bad leaf rose", "back": "ink soft true", "field": "ink soft true", "off": "soft", "fault": "ink bad", "note": "ink",
              "warn-back": "warn", "true": "on", "d": "on", "bad": "on"}
     low = {(text, ground): round(contrast(colours[text], colours[ground]), 2) for ground, row in texts.items() for text in row.split()
            if contrast(colours[text], colours[ground]) < 4.5}
@@ -151,12 +174,14 @@ def test_in_the_dark_the_page_and_its_curves_are_dark(page):
 def test_axe_finds_nothing_that_keeps_somebody_from_using_the_page(page, pytestconfig, on, width):
     axe, = (pytestconfig.rootpath.parent / "build/setup").glob("axe-core-*.js")
     traced(page)
+    scope_open(page)
     dark(page, on)
     resized(page, width)
     page.run(axe.read_text(encoding="utf-8"))
     found = page.driver.execute_async_script("""const done = arguments[arguments.length - 1];
         axe.run({ runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }).then(({ violations, passes }) => done([passes.length,
             violations.flatMap((v) => v.nodes.map((n) => `${v.id}: ${n.html.slice(0, 100)}`))]), (error) => done([0, [String(error)]]))""")
+    scope_open(page, False)
     assert found[1] == [] and found[0] > 10
 
 
@@ -253,7 +278,9 @@ def test_triggered_is_said_of_a_trace_and_goes_when_the_next_one_is_awaited(page
 def test_tab_comes_to_every_control_and_shows_where_it_is(page):
     from selenium.webdriver import ActionChains
     name = "e.id || e.dataset.fault || e.dataset.button || e.dataset.mode || e.name || e.getAttribute('aria-label') || e.tagName"
-    wanted = page.run(f"""return [...document.querySelectorAll("{CONTROLS}, a, [role=button], [role=slider]")].filter((e) => e.getClientRects().length && !e.disabled).map((e) => {name})""")
+    names = f"""return [...document.querySelectorAll("{CONTROLS}, a, [role=button], [role=slider]")].filter((e) => e.getClientRects().length && !e.disabled).map((e) => {name})"""
+    scope_open(page)
+    wanted = page.run(names)
     page.run("document.activeElement.blur(); getSelection().removeAllRanges(); window.scrollTo(0, 0)")
     found: dict[str, bool] = {}
     for _ in range(len(wanted) + 8):
@@ -261,7 +288,8 @@ def test_tab_comes_to_every_control_and_shows_where_it_is(page):
         key, seen = page.run(f"""const e = document.activeElement, s = getComputedStyle(e), r = e.getBoundingClientRect();
             return [{name}, s.outlineStyle !== "none" && parseFloat(s.outlineWidth) >= 2 && r.top < innerHeight && r.bottom > 0]""")
         found[key] = seen
-    assert [key for key in wanted if key not in found] == [] and {"save-csv", "save-scenario", "pot", "S2", "open_b", "scope-graphs"} <= set(wanted)
+    assert [key for key in wanted if key not in found] == [] and {"save-csv", "save-scenario", "pot", "S2", "open_b", "scope-graphs", "scope-numbers", "cursor-a", "cursor-b", "scope-low", "scope-png"} <= set(wanted)
+    scope_open(page, False)
     assert [key for key, seen in found.items() if not seen and key in wanted] == []
 
 

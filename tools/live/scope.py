@@ -8,9 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from tools.common import drive_tables
 from tools.common.errors import UserError
 
-from . import lnet
+from . import lnet, view
 from .scale import scale_of
 from .symbols import Symbols, Variable
 
@@ -25,6 +26,10 @@ AGAIN_S = 0.5
 MOST_FACTOR = 1000
 USUAL = ("board_drive.run.control.i_q13.d", "board_drive.run.control.i_q13.q", "board_drive.angle", "board_drive.run.estimator.omega_erpm")
 """What it shows at first."""
+STATE, FAULT = "board_drive.state", "board_drive.fault"
+RECORDER = ("board_drive.phases_q13.a", "board_drive.phases_q13.b", "board_drive.run.control.v_q14.d", "board_drive.run.control.v_q14.q", "board_drive.angle",
+            "board_drive.run.estimator.omega_erpm", STATE, FAULT)
+"""What it records around a fault: what the fault recorder does (docs/faults.md), whose place in RAM it has."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +70,16 @@ class Scope(threading.Thread):
         names = [name for name in USUAL if name in self.symbols.variables] or list(self.symbols.variables)[:1]
         return {"channels": names, "trigger": names[0], "level": 0.0, "rising": True, "position": 0.25, "factor": 2, "mode": "stop"}
 
+    def recorder(self) -> dict[str, Any]:
+        """The setup that waits for a fault: the rows are as far apart as the fault recorder's."""
+        names = [name for name in RECORDER if name in self.symbols.variables]
+        return {"channels": names, "trigger": STATE, "level": float(list(view.states()).index("FAULT")), "rising": True, "position": 0.75, "factor": 4,
+                "mode": "normal"}
+
     def hello(self) -> dict[str, Any]:
         """For a new tab: every variable that it can record, and what is set up."""
         units = {name: scale_of(name, self.params).unit for name, item in self.symbols.variables.items() if item.bytes in WIDTHS}
-        return {"variables": units, "period_s": self.period_s, "most_words": lnet.MOST_WORDS, **self.told, "trace": self.trace}
+        return {"variables": units, "period_s": self.period_s, "most_words": lnet.MOST_WORDS, "fault": self.recorder(), **self.told, "trace": self.trace}
 
     def end(self) -> None:
         """Returns soon."""
@@ -171,12 +182,20 @@ class Scope(threading.Thread):
         step_s = setup.factor * self.period_s
         before = round(setup.position * (len(rows) - 1)) if setup.trigger else 0
         self.trace = {"names": [item.name for item in setup.channels], "units": [scale.unit for scale in scales], "triggered": setup.trigger is not None,
+                      "fault": _fault(setup, rows),
                       "rows": [[(number - before) * step_s] + [float(f"{value * scale.per_count:.6g}") for value, scale in zip(row, scales)]
                                for number, row in enumerate(rows)]}
         self.publish({"trace": self.trace})
         if self.setup is not None and self.setup.mode == "single" and not self.changed.is_set():
             self.setup = None
             self._tell(setup=self.told["setup"] | {"mode": "stop"}, status="stop")
+
+
+def _fault(setup: Setup, rows: list[tuple[int, ...]]) -> str | None:
+    """The fault that the trace ends with, where it is recorded."""
+    codes = {row.code: row.name for row in drive_tables.faults() if row.code}
+    at = next((number for number, item in enumerate(setup.channels) if item.name == FAULT), None)
+    return None if at is None else codes.get(rows[-1][at])
 
 
 def _number(wish: dict[str, Any], key: str, low: float, high: float) -> float:

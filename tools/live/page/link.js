@@ -37,6 +37,14 @@ function make(tag, properties, parent) {
   return element;
 }
 
+// The browser saves it by this name.
+function save(blob, name) {
+  const file = make("a", { href: URL.createObjectURL(blob), download: name }, document.body);
+  file.click();
+  file.remove();
+  URL.revokeObjectURL(file.href);
+}
+
 // A colour of the style by its name, for what is drawn: it is another one in the dark.
 const tint = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 

@@ -7,6 +7,13 @@ function say(text) {
   by("message").textContent = text;
 }
 
+// For a while.
+function warn(text) {
+  say(text);
+  clearTimeout(warn.timer);
+  warn.timer = setTimeout(() => say(""), 6000);
+}
+
 // Without an answer the last values are grey, and no state is claimed.
 function hush(on) {
   document.body.classList.toggle("silent", on);
@@ -43,7 +50,7 @@ function take(message) {
   if (message.t !== undefined || message.scope || message.trace || message.armed) { requestAnimationFrame(() => link.send({ seen: true })); }
   if (message.hello) { begin(message.hello); return; }
   if (message.ended) { say(`The board has stopped: ${message.ended}`); return; }
-  if (message.refused) { foc33.refused = message.refused; say(message.refused); setTimeout(() => say(""), 4000); return; }
+  if (message.refused) { foc33.refused = message.refused; warn(message.refused); return; }
   if (!views) { return; }
   if (message.scope) { views.scope.set(message.scope); return; }
   if (message.armed) { views.scope.armed(); return; }
@@ -65,10 +72,7 @@ by("pace").addEventListener("change", () => { paceBusy = performance.now() + 500
 for (const what of ["scenario", "csv"]) {
   by(`save-${what}`).addEventListener("click", async () => { // what cannot be saved says why, instead of an empty file
     const answer = await fetch(`/save/${what}${location.search}`);
-    if (!answer.ok) { say((await answer.text()).trim()); setTimeout(() => say(""), 6000); return; }
-    const file = make("a", { href: URL.createObjectURL(await answer.blob()), download: { scenario: "recorded.toml", csv: "recorded.csv" }[what] }, document.body);
-    file.click();
-    file.remove();
-    URL.revokeObjectURL(file.href);
+    if (!answer.ok) { warn((await answer.text()).trim()); return; }
+    save(await answer.blob(), { scenario: "recorded.toml", csv: "recorded.csv" }[what]);
   });
 }
