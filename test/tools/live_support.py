@@ -31,6 +31,12 @@ def kept_parts() -> board.Parts:
 
 
 @functools.cache
+def recorder_parts() -> board.Parts:
+    """The firmware with the fault recorder in the scope's place."""
+    return board.parts(defines="-DSCOPE=0")
+
+
+@functools.cache
 def known() -> symbols.Symbols:
     """Its variables."""
     return symbols.Symbols.read(parts().symbols)

@@ -112,6 +112,24 @@ def test_a_trace_comes_over_the_same_line(desk):
     assert [(later - earlier) % 65536 for earlier, later in zip(ticks, ticks[1:])] == [1] * (len(ticks) - 1) and len(ticks) > 200
 
 
+def test_the_record_of_a_fault_comes_over_the_same_line(desk):
+    setup = desk.page.hello()["scope"]["fault"]
+    desk.page.act({"start": 1000.0})
+    desk.state("CLOSED")
+    desk.messages.clear()
+    desk.page.scope.ask(setup)
+    time.sleep(0.5) # until the rows before a fault are there
+    desk.do(fault=["open_b", True])
+    trace = desk.trace()
+    states = [row[1 + setup["channels"].index("board_drive.state")] for row in trace["rows"]]
+    assert trace["fault"] == "OPEN_PHASE" and states == [5.0] * 39 + [7.0] * 14
+    desk.page.scope.ask(setup | {"mode": "stop"})
+    desk.do(fault=["open_b", False])
+    desk.page.act({"stop": True})
+    desk.page.act({"clear": True})
+    until(lambda: desk.frame()["fault"] == "NONE", "not cleared")
+
+
 @pytest.mark.parametrize("wish, part", [
     ({"start": 9.0}, "choose"), ({"start": "fast"}, "impossible"), ({"press": "S2"}, "no such command"), ([], "no such command")])
 def test_a_wrong_command_is_refused_in_one_line(desk, wish, part):

@@ -8,13 +8,17 @@ import time
 
 import numpy as np
 import pytest
-from live_support import Living, bench, known, parts, until
+from live_support import Living, bench, known, parts, recorder_parts, until
 from support import refusal
 
-from tools.live import symbols
+from tools.bench import recorder
+from tools.live import board, record, symbols
 from tools.live.lnet import Channel, Lnet, ScopeState, Trigger
 from tools.live.scale import RAW, scale_of
-from tools.live.scope import Scope
+from tools.live.recording import Origin
+from tools.live.scope import FAULT, STATE, Scope
+from tools.live.symbols import Symbols
+from tools.live.virtual_board import VirtualBoard
 
 SYMBOLS = known()
 KNOWN = SYMBOLS.variables
@@ -196,3 +200,68 @@ def test_a_setup_that_makes_no_sense_is_refused_in_one_line(living, wish, part):
     before = living.board.scope.setup
     refusal(lambda: living.ask(**wish), part)
     assert living.board.scope.setup is before
+
+
+# ---- a fault -----------------------------------------------------------------------------------------------------------------
+def test_what_waits_for_a_fault_is_a_setup_that_the_firmware_takes(living):
+    setup = living.board.scope.hello()["fault"]
+    link, scope = SetUp(), Scope(EmptyLink, SYMBOLS, parts().library.params, lambda message: None)
+    scope._start(link, scope._read(setup), True, 848)
+    assert len(setup["channels"]) == 8 and link.trigger == Trigger(KNOWN[STATE].address, 7, True, KNOWN[STATE].signed) and link.delay == -39
+
+
+@pytest.mark.parametrize("codes, name", [([0, 0, 16], "OPEN_PHASE"), ([6, 6, 6], "STALL"), ([16, 0, 0], None), ([99, 99, 99], None)])
+def test_a_trace_has_the_fault_that_it_ends_with(codes, name):
+    published: list[dict] = []
+    scope = Scope(EmptyLink, SYMBOLS, parts().library.params, published.append)
+    setup = scope._read(WISH | {"channels": [I_Q, FAULT]})
+    scope._hand_on(setup, [(0, code) for code in codes])
+    scope._hand_on(scope._read(WISH | {"channels": [I_Q]}), [(16,)])
+    assert [message["trace"]["fault"] for message in published if "trace" in message] == [name, None]
+
+
+def test_the_fault_recorders_rows_are_a_trace_however_their_text_is_cut():
+    made = recorder_parts()
+    item, messages = VirtualBoard(made.library, Origin(made.motor, made.board, ["SCOPE=0"], {}), Symbols.read(made.symbols)), []
+    item.start(messages.append)
+    item.act({"press": "S2"})
+    item.run(0.2)
+    item.act({"release": "S2"})
+    item.run(2.5)
+    item.act({"fault": ["open_b", True]})
+    said: list[str] = []
+    feed = item.records.feed
+    item.records.feed = lambda text: (said.append(text), feed(text))[1]
+    for _ in range(100):
+        item.run(0.02)
+    trace, = (message["trace"] for message in messages)
+    text = "".join(said)
+    assert item.scope is None and item.kept is None and item.hello()["recorder"]["trace"] is trace and trace["fault"] == "OPEN_PHASE"
+    rows = recorder.scaled(recorder.of_text(text)[0], made.library.params, made.library.states)
+    table = np.array(trace["rows"], float)
+    for number, wanted in enumerate((rows.time_ms / 1000.0, rows.i_a, rows.i_b, rows.v_d, rows.v_q, rows.angle_deg, rows.speed_rpm, rows.bus_v)):
+        assert table[:, number] == pytest.approx(wanted, rel=1e-5, nan_ok=True)
+    assert [7 <= np.isfinite(table[:, number]).sum() <= 8 for number in (6, 7)] == [True, True] and table[:, 8].tolist() == [5.0] * 48 + [7.0] * 16
+    reader = record.Records(made.library.params, made.library.states)
+    found = [trace for letter in text + text for trace in [reader.feed(letter)] if trace]
+    assert found == [trace, trace] and reader.feed("row 3 1 2\r\n" * 100) is None and len(reader.text) <= record.LONGEST_LINE
+
+
+@pytest.mark.parametrize("params, names, part", [
+    ({"RECORDER_PERIODS": 4.0}, ["board_recorder.left"], "its rows come after the next fault"), ({"RECORDER_PERIODS": 0.0}, [], "RECORDER_PERIODS is 0"),
+    ({"RECORDER_PERIODS": 4.0}, ["SnapDone"], "SNAPSHOT has the fault recorder's place"), ({"RECORDER_PERIODS": 4.0}, ["board_params.speed_kp_q13"], "PARAMS_IN_RAM or TUNING has"),
+    ({"RECORDER_PERIODS": 4.0}, ["board_bringup.step"], "BRINGUP has"), ({"RECORDER_PERIODS": 4.0}, ["IdentifyParm.r"], "IDENTIFY has")])
+def test_a_firmware_without_a_recorder_says_what_to_build(params, names, part):
+    said = record.told(Symbols(dict.fromkeys(names)), params)
+    assert part in said and ("SCOPE 1" in said) == (said != record.COMES)
+
+
+@pytest.mark.parametrize("defines, variable", [("-DSNAPSHOT", "SnapDone"), ("-DTUNING", "board_params"), ("-DBRINGUP", "board_bringup")])
+def test_a_mode_that_takes_the_recorders_place_is_known_by_its_variables(defines, variable):
+    found = Symbols.read(board.parts(defines=f"{defines} -DSCOPE=0").symbols)
+    assert record.TAKEN[variable] in record.told(found, {"RECORDER_PERIODS": 4.0})
+    assert record.told(known(), {"RECORDER_PERIODS": 4.0}) == record.COMES
+
+
+def test_the_scope_is_on_unless_somebody_says_otherwise():
+    assert board.with_scope([]) == ["SCOPE=1"] and board.with_scope(["SCOPE=1"]) == ["SCOPE=1"] and board.with_scope(["TUNING", "SCOPE=0"]) == ["TUNING", "SCOPE=0"]

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 from live_browser import SIZE, Page
-from live_support import served, until
+from live_support import recorder_parts, served, until
 
 from tools.common import drive_tables
 
@@ -326,10 +326,9 @@ def test_png_shows_curves_numbers_and_cursors(page, chromium):
 
 
 def test_without_a_trace_nothing_is_saved_and_a_line_says_what_to_do(page):
-    inside(page, "views.scope.trace = null")
-    for name in ("csv", "png"):
+    for name, said in (("csv", "CSV"), ("png", "PNG"), ("keep", "reference")):
         page.click(f"#scope-{name}")
-        assert message(page) == f"{name.upper()}: no trace yet: click Auto or Single first"
+        assert message(page) == f"{said}: no trace yet: click Auto or Single first"
 
 
 # ---- eight channels, and a fault -----------------------------------------------------------------------------------------------
@@ -365,10 +364,9 @@ def test_the_record_of_a_fault_comes_by_itself_with_cause_and_remedy_beside_it(p
     page.click("[data-button=S2]")
     page.state("CLOSED")
     page.click("#scope-fault")
-    assert page.one("#scope-why").is_displayed() and page.text("#scope-why").startswith("Armed")
-    page.wait("return document.getElementById('scope-status').textContent === 'waits for its trigger'", "not armed")
-    page.wait("return window.eval('foc33.frames') > 10", "no frames")
-    until(lambda: inside(page, "views.scope.setup.mode") == "normal", "not normal")
+    page.wait("return document.getElementById('scope-why').textContent.startsWith('Armed')", "not armed")
+    assert page.one("#scope-why").is_displayed() and page.one("#scope-fault").get_attribute("aria-pressed") == "true"
+    page.wait("return document.getElementById('scope-status').textContent === 'waits for its trigger'", "it does not wait")
     page.run("return new Promise((done) => setTimeout(done, 500))") # until the rows before a fault are there
     page.click("[data-fault=open_b]")
     page.wait("return document.querySelector('#scope-why b')?.textContent === 'OPEN_PHASE'", "no record")
@@ -384,3 +382,23 @@ def test_the_record_of_a_fault_comes_by_itself_with_cause_and_remedy_beside_it(p
     page.click("[data-button=S2]")
     page.state("STOPPED")
     assert page.text("#scope-why").startswith("OPEN_PHASE") # the record stays
+
+
+def test_a_firmware_without_the_scope_shows_the_rows_of_its_fault_recorder_and_nothing_moves_when_they_come(chromium):
+    with served("--defines=-DSCOPE=0", made_of=recorder_parts()) as running:
+        page = Page(chromium[0], running.url)
+        assert page.text("#scope-title") == "Fault recorder" and page.text("#scope-why") == "The firmware's fault recorder: its rows come after the next fault."
+        assert [page.one(f"#scope-{name}").is_displayed() for name in ("mode", "fault", "channels", "trigger", "cursors", "fft", "csv")] == [False] * 4 + [True] * 3
+        places = "JSON.stringify([...document.querySelectorAll('#scope-card button, #scope-card input')].map((e) => e.getBoundingClientRect().top + scrollY))"
+        before = inside(page, places)
+        page.click("[data-button=S2]")
+        page.state("CLOSED")
+        page.click("[data-fault=open_b]")
+        page.wait("return document.querySelector('#scope-why b')?.textContent === 'OPEN_PHASE'", "no record")
+        assert "Remedy: check the motor's wires" in page.text("#scope-why") and inside(page, places) == before
+        item = inside(page, "views.scope.trace")
+        assert item["names"] == ["i_a", "i_b", "v_d", "v_q", "angle", "speed", "bus", "state"] and len(item["rows"]) == 64
+        assert [row[8] for row in item["rows"]] == [5.0] * 48 + [7.0] * 16 and item["rows"][48][0] == 0.0
+        assert float(column(page, "mean")[6]) == pytest.approx(24.0, abs=0.3)
+        page.driver.refresh() # a new tab has it, too
+        page.wait("return document.querySelector('#scope-why b')?.textContent === 'OPEN_PHASE'", "it is lost")

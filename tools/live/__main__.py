@@ -63,15 +63,14 @@ def _real(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any
 
 def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any]:
     """Makes the bench of a virtual board."""
-    from .board import SCOPE
+    from .board import with_scope
     from .recording import Origin
     from .symbols import Symbols
     from .virtual_board import VirtualBoard
     if options.elf is not None:
         raise UserError("an ELF file without a board", "ELF", "name the board's serial port, PORT=/dev/ttyUSB0")
-    defines = command_common.macros(options.defines)
     words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
-    origin = Origin(parts.motor, parts.board, defines + [SCOPE] * (SCOPE not in defines), words)
+    origin = Origin(parts.motor, parts.board, with_scope(command_common.macros(options.defines)), words)
     symbols = Symbols.read(parts.symbols)
     return lambda: VirtualBoard(parts.library, origin, symbols)
 

@@ -24,6 +24,13 @@ from .pace import RealTime
 SCOPE = "SCOPE=1"
 REST = Scenario("live-board", "", "", MOTOR, "", 0.0)
 """Nothing happens."""
+
+
+def with_scope(macros: list[str]) -> list[str]:
+    """The scope is on, unless somebody has said SCOPE=0: then the fault recorder has its place."""
+    return macros if any(macro.startswith("SCOPE=") for macro in macros) else [*macros, SCOPE]
+
+
 STEP_S = 0.002
 """What the board runs in one go: a byte of the serial line waits so long at most."""
 BACKGROUND_PERIODS = 2
@@ -51,7 +58,7 @@ def parts(motor: str | None = None, board: str | None = None, defines: str = "",
     header = command_common.header_for(options)
     folder = None if header is None else build.header_folder(header)
     macros = command_common.macros(defines)
-    macros += [build.app(app, "APP")] if app else [] if SCOPE in macros else [SCOPE]
+    macros = [*macros, build.app(app, "APP")] if app else with_scope(macros)
     if cpu == "33f":
         elf = pil_command.image_for(macros, folder, image)
         return Parts(motor_part, board_part, pil.library(macros, folder), elf, plain_elf.write(elf, elf.with_suffix(".client.elf")))

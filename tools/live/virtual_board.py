@@ -21,6 +21,7 @@ from .faults import FAULTS, keys_of
 from .kept import Kept
 from .line import Line
 from .lnet import ANSWER_S, Lnet
+from .record import Records
 from .recording import BUTTONS, POT, Origin, Recording
 from .scope import Scope
 from .symbols import Symbols
@@ -42,8 +43,10 @@ class VirtualBoard:
         self.library, self.origin = library, origin
         self.line = Line()
         self.scope: Scope | None = None
+        self.publish: Callable[[dict[str, Any]], None] = lambda message: None
         self.symbols = symbols
-        self.kept = Kept.of(symbols)
+        self.records = None if library.params["SCOPE"] else Records(library.params, library.states)
+        self.kept = Kept.of(symbols) if self.records is None else None # it needs the scope's link
         scenario = Scenario("live", "", "", "", "", 0.0, defines=origin.defines)
         self.job = simulate.prepare(scenario, library, origin.motor, origin.board)
         self.rated = motor_file.load(str(origin.motor.path))
@@ -71,7 +74,8 @@ class VirtualBoard:
 
     def start(self, publish: Callable[[dict[str, Any]], None]) -> None:
         """The scope's thread, where the firmware has a scope; it talks over the serial line while the board runs."""
-        if self.symbols is not None:
+        self.publish = publish
+        if self.symbols is not None and self.records is None:
             self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish, self.kept.beat if self.kept else lambda link: None)
             self.scope.start()
 
@@ -135,10 +139,17 @@ class VirtualBoard:
         self.board.run(periods)
         self.time_s = self.board.get("time_s")
         data = self.board.trace_take()
-        self.line.exchange(self._send, self.board.uart_take())
+        self._said(self.board.uart_take())
         if len(data):
             times = before_s + (self.time_s - before_s) / len(data) * np.arange(1, len(data) + 1)
             self._recorded(Trace(SIGNALS, times, np.ascontiguousarray(data.T)))
+
+    def _said(self, text: str) -> None:
+        """By the firmware: to the scope's link, or lines among which may be the fault recorder's."""
+        if self.records is None:
+            self.line.exchange(self._send, text)
+        elif trace := self.records.feed(text):
+            self.publish({"trace": trace})
 
     def _send(self, text: str) -> int:
         """Characters for the board, which are part of the recording."""
@@ -277,7 +288,8 @@ class VirtualBoard:
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(True), "kept": self.kept is not None, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
+                "panels": view.panels(True), "kept": self.kept is not None, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None,
+                "recorder": self.records and self.records.hello(self.symbols or Symbols({}))}
 
     def frame(self) -> dict[str, Any]:
         """What has happened since the last frame, and how things stand."""

@@ -5,9 +5,14 @@ class ScopeView extends TracesView {
 
   constructor(hello, send) {
     super();
-    by("scope-card").hidden = !hello.scope;
+    by("scope-card").hidden = !hello.scope && !hello.recorder;
+    by("scope-card").classList.toggle("recorder", Boolean(hello.recorder));
+    by("scope-title").textContent = hello.recorder ? "Fault recorder" : "Scope";
+    Object.assign(this, { faults: hello.faults, told: hello.recorder?.told });
+    if (hello.recorder) { this.expect(hello.recorder.names, hello.recorder.units); }
+    if (hello.recorder?.trace) { this.draw(hello.recorder.trace); } else { this.why(); }
     if (!hello.scope) { return; }
-    Object.assign(this, { send, faults: hello.faults, units: hello.scope.variables, period: hello.scope.period_s, setup: hello.scope.setup, recorder: hello.scope.fault });
+    Object.assign(this, { send, units: hello.scope.variables, period: hello.scope.period_s, setup: hello.scope.setup, recorder: hello.scope.fault });
     this.names = new Map(Object.keys(this.units).map((name) => [this.short(name), name]));
     by("variables").replaceChildren(...[...this.names.keys()].sort().map((name) => new Option(name)));
     this.channels();
@@ -79,7 +84,9 @@ class ScopeView extends TracesView {
     by("scope-factor").value = setup.factor;
     for (const item of ["scope-edge", "scope-level", "scope-position"]) { by(item).disabled = !setup.trigger; }
     for (const button of document.querySelectorAll("#scope-mode button")) { button.setAttribute("aria-pressed", String(button.dataset.mode === setup.mode)); }
-    by("scope-fault").setAttribute("aria-pressed", String(setup.mode === this.recorder.mode && setup.trigger === this.recorder.trigger && setup.level === this.recorder.level));
+    const armed = ["mode", "trigger", "level"].every((key) => setup[key] === this.recorder[key]);
+    by("scope-fault").setAttribute("aria-pressed", String(armed));
+    if (armed) { this.expect(setup.channels, setup.channels.map((name) => this.units[name])); }
     this.why();
     this.say({ waits: this.waits(), stop: "stopped" }[status] ?? status, !["waits", "stop"].includes(status));
   }
@@ -101,15 +108,21 @@ class ScopeView extends TracesView {
   draw(trace) {
     super.draw(trace);
     this.why();
-    if (this.setup.mode !== "stop") { this.say(trace.triggered ? "triggered" : "not triggered"); }
+    if (this.setup && this.setup.mode !== "stop") { this.say(trace.triggered ? "triggered" : "not triggered"); }
+  }
+
+  // Room for a record that is to come: it moves nothing then.
+  expect(names, units) {
+    if (this.trace?.names.join() !== names.join()) { super.draw({ names, units, triggered: false, rows: [-0.01, 0.003].map((time) => [time, ...names.map(() => null)]) }); }
   }
 
   // Beside a record of a fault: which one, its cause and its remedy.
   why() {
     const place = by("scope-why"), fault = this.trace?.fault, row = this.faults[fault], armed = by("scope-fault").getAttribute("aria-pressed") === "true";
-    place.hidden = !armed && !fault;
+    place.hidden = !armed && !fault && !this.told;
     place.replaceChildren();
-    if (!row) { place.append("Armed: the next fault's record comes by itself. Until then nothing else is recorded."); return; }
+    place.classList.toggle("bad", Boolean(row));
+    if (!row) { place.append(this.told ?? "Armed: the next fault's record comes by itself. Until then nothing else is recorded."); return; }
     make("b", { textContent: fault }, place);
     place.append(`, at 0 ms: ${row.cause}. Remedy: ${row.remedy}.`);
   }

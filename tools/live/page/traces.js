@@ -190,7 +190,7 @@ class TracesView {
 
   // ---- y axes by hand ------------------------------------------------------------------------------------------------------
   axes(units) {
-    const before = by("scope-axis").value;
+    const before = by("scope-axis").selectedOptions[0]?.value;
     by("scope-axis").replaceChildren(...units.map((unit) => new Option(unit || "no unit", unit)));
     if (units.includes(before)) { by("scope-axis").value = before; }
     this.limits();
@@ -284,16 +284,22 @@ class TracesView {
     const press = (id, on) => by(id).setAttribute("aria-pressed", String(on));
     by("scope-cursors").onclick = () => { press("scope-cursors", this.cursors = !this.cursors); this.refresh(); };
     by("scope-fft").onclick = () => { this.view = this.view === "time" ? "spectrum" : "time"; press("scope-fft", this.view !== "time"); this.refresh(); };
-    by("scope-keep").onclick = () => { TracesView.kept = TracesView.kept ? null : this.trace; press("scope-keep", Boolean(TracesView.kept)); this.refresh(); };
+    by("scope-keep").onclick = () => {
+      if (!this.filled) { warn("reference: no trace yet: click Auto or Single first"); return; }
+      TracesView.kept = TracesView.kept ? null : this.trace; press("scope-keep", Boolean(TracesView.kept));
+      this.refresh();
+    };
     ["a", "b"].forEach((name, n) => { by(`cursor-${name}`).oninput = (event) => this.move(n, this.grid[Number(event.target.value)]); });
     by("scope-axis").onchange = () => this.limits();
     by("scope-low").onchange = by("scope-high").onchange = () => this.typed();
-    by("scope-csv").onclick = () => this.trace ? save(new Blob([this.csv()], { type: "text/csv" }), "scope.csv") : warn("CSV: no trace yet: click Auto or Single first");
-    by("scope-png").onclick = () => this.trace ? this.picture().toBlob((blob) => save(blob, "scope.png")) : warn("PNG: no trace yet: click Auto or Single first");
+    by("scope-csv").onclick = () => this.filled ? save(new Blob([this.csv()], { type: "text/csv" }), "scope.csv") : warn("CSV: no trace yet: click Auto or Single first");
+    by("scope-png").onclick = () => this.filled ? this.picture().toBlob((blob) => save(blob, "scope.png")) : warn("PNG: no trace yet: click Auto or Single first");
     press("scope-cursors", false);
     press("scope-fft", false);
     press("scope-keep", Boolean(TracesView.kept));
   }
+
+  get filled() { return this.curves.some((curve) => curve.time.length); }
 
   // What is shown as a table: a column for each curve, those of the reference beside them with their own time or frequency.
   csv() {
