@@ -72,6 +72,25 @@ def _running(driver: Any) -> None:
     time.sleep(1.0)
 
 
+def _measured(driver: Any) -> None:
+    """A reference, then more load; cursors."""
+    _choose(driver, "scope-factor", "10")
+    seen = driver.execute_script("return window.eval('foc33.traces')")
+    _until(driver, f"window.eval('foc33.traces') > {seen + 2}")
+    _click(driver, "#scope-keep")
+    _slide(driver, "load.constant_nm", 0.02)
+    time.sleep(2.0)
+    _click(driver, "[data-mode=stop]")
+    _click(driver, "#scope-cursors")
+
+
+def _unmeasured(driver: Any) -> None:
+    """As before."""
+    _click(driver, "#scope-cursors")
+    _click(driver, "#scope-keep")
+    _slide(driver, "load.constant_nm", 0.05)
+
+
 def _faulty(driver: Any) -> None:
     """The load stays, and a wire breaks."""
     _click(driver, "[data-fault=open_b]")
@@ -91,8 +110,15 @@ def _remote(driver: Any) -> None:
 
 def _save(driver: Any, name: str, size: tuple[int, int]) -> None:
     browser.resize(driver, *size)
+    driver.execute_script("scrollTo(0, 0)")
     time.sleep(0.6)
     driver.save_screenshot(str(paths.ROOT / "docs" / f"{name}.png"))
+
+
+def _save_part(driver: Any, name: str, selector: str) -> None:
+    browser.resize(driver, SIZE[0], 1600)
+    time.sleep(0.6)
+    driver.find_element("css selector", selector).screenshot(str(paths.ROOT / "docs" / f"{name}.png"))
 
 
 def _write() -> int:
@@ -103,6 +129,9 @@ def _write() -> int:
             with _page(driver):
                 _running(driver)
                 _save(driver, "live-running", SIZE)
+                _measured(driver)
+                _save_part(driver, "live-scope", "#scope-card")
+                _unmeasured(driver)
                 _faulty(driver)
                 _save(driver, "live-fault", SMALL)
             browser.resize(driver, *SIZE)

@@ -226,7 +226,7 @@ class TracesView {
   get cut() {
     if (!this.cursors || !this.span) { return []; }
     const [from, to] = this.shown;
-    return this.places[this.view] ??= [from + (to - from) / 4, to - (to - from) / 4].map((x) => this.nearest(x));
+    return this.places[this.view] ??= [from + (to - from) / 3, to - (to - from) / 3].map((x) => this.nearest(x));
   }
 
   get grid() { return this.curves.find((curve) => !curve.kept && curve.points.length)?.points.map(([x]) => x) ?? [0]; }
