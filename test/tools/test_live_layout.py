@@ -129,7 +129,7 @@ def test_no_control_moves_when_the_record_of_a_fault_comes_and_its_cause_has_roo
         v.set({ setup: v.recorder, status: "waits" });
         const calm = places(), names = Object.keys(v.faults).filter((name) => name !== "NONE");
         const rows = [-0.01, 0, 0.003].map((t) => [t, 1, 2, 3, 4, 5, 6, 5, 16]);
-        for (const fault of names) { v.draw({ ...v.trace, triggered: true, fault, rows }); if (by("scope-why").scrollHeight > by("scope-why").clientHeight) { cut.push(fault); } if (places() !== calm) { moved.push(fault); } }
+        for (const fault of names) { v.draw({ names: v.recorder.channels, units: v.recorder.channels.map((name) => v.units[name]), triggered: true, fault, rows }); if (by("scope-why").scrollHeight > by("scope-why").clientHeight) { cut.push(fault); } if (places() !== calm) { moved.push(fault); } }
         v.draw({ ...v.trace, fault: null }); v.set({ setup, status: "stop" });
         return [cut, moved]; })()""" % PLACES)
     assert cut == [] and moved == []

@@ -247,6 +247,12 @@ def test_the_fault_recorders_rows_are_a_trace_however_their_text_is_cut():
     assert found == [trace, trace] and reader.feed("row 3 1 2\r\n" * 100) is None and len(reader.text) <= record.LONGEST_LINE
 
 
+def test_without_the_scope_nothing_can_be_kept():
+    made = board.parts(defines="-DPARAMS_IN_RAM -DPARAMS_KEPT=1 -DSCOPE=0")
+    item = VirtualBoard(made.library, Origin(made.motor, made.board, [], {}), Symbols.read(made.symbols))
+    assert item.kept is None and item.hello()["kept"] is False
+
+
 @pytest.mark.parametrize("params, names, part", [
     ({"RECORDER_PERIODS": 4.0}, ["board_recorder.left"], "its rows come after the next fault"), ({"RECORDER_PERIODS": 0.0}, [], "RECORDER_PERIODS is 0"),
     ({"RECORDER_PERIODS": 4.0}, ["SnapDone"], "SNAPSHOT has the fault recorder's place"), ({"RECORDER_PERIODS": 4.0}, ["board_params.speed_kp_q13"], "PARAMS_IN_RAM or TUNING has"),
