@@ -122,7 +122,7 @@ class ScopeView extends TracesView {
     place.hidden = !armed && !fault && !this.told;
     place.replaceChildren();
     place.classList.toggle("bad", Boolean(row));
-    if (!row) { place.append(this.told ?? "Armed: the next fault's record comes by itself. Until then nothing else is recorded."); return; }
+    if (!row) { place.append(this.told ?? "Armed: the next fault's record comes by itself. Until then nothing else is recorded. The firmware's own recorder is in builds with SCOPE 0."); return; }
     make("b", { textContent: fault }, place);
     place.append(`, at 0 ms: ${row.cause}. Remedy: ${row.remedy}.`);
   }
