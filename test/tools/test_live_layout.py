@@ -129,7 +129,12 @@ def test_no_control_moves_when_the_record_of_a_fault_comes_and_its_cause_has_roo
         v.set({ setup: v.recorder, status: "waits" });
         const calm = places(), names = Object.keys(v.faults).filter((name) => name !== "NONE");
         const rows = [-0.01, 0, 0.003].map((t) => [t, 1, 2, 3, 4, 5, 6, 5, 16]);
-        for (const fault of names) { v.draw({ names: v.recorder.channels, units: v.recorder.channels.map((name) => v.units[name]), triggered: true, fault, rows }); if (by("scope-why").scrollHeight > by("scope-why").clientHeight) { cut.push(fault); } if (places() !== calm) { moved.push(fault); } }
+        const units = v.recorder.channels.map((name) => v.units[name]);
+        for (const fault of names) {
+            v.draw({ names: v.recorder.channels, units, triggered: true, fault, rows });
+            if (by("scope-why").scrollHeight > by("scope-why").clientHeight) { cut.push(fault); }
+            if (places() !== calm) { moved.push(fault); }
+        }
         v.draw({ ...v.trace, fault: null }); v.set({ setup, status: "stop" });
         return [cut, moved]; })()""" % PLACES)
     assert cut == [] and moved == []
@@ -289,7 +294,8 @@ def test_tab_comes_to_every_control_and_shows_where_it_is(page):
         key, seen = page.run(f"""const e = document.activeElement, s = getComputedStyle(e), r = e.getBoundingClientRect();
             return [{name}, s.outlineStyle !== "none" && parseFloat(s.outlineWidth) >= 2 && r.top < innerHeight && r.bottom > 0]""")
         found[key] = seen
-    assert [key for key in wanted if key not in found] == [] and {"save-csv", "save-scenario", "pot", "S2", "open_b", "scope-graphs", "scope-numbers", "cursor-a", "cursor-b", "scope-low", "scope-png"} <= set(wanted)
+    assert [key for key in wanted if key not in found] == [] and set(
+        "save-csv save-scenario pot S2 open_b scope-graphs scope-numbers cursor-a cursor-b scope-low scope-png scope-fault".split()) <= set(wanted)
     scope_open(page, False)
     assert [key for key, seen in found.items() if not seen and key in wanted] == []
 
