@@ -3,7 +3,10 @@
 A forced current vector I pulls the rotor with Kt I sin(angle between them): a spring of P Kt I per rad, hardly damped.
 """
 
+import ctypes
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +14,13 @@ import numpy as np
 from tools.common.board_file import BoardFile
 from tools.common.motor_file import Motor
 from tools.common.param_rows import number, parameters
+from tools.common.paths import ROOT
 
+from . import compiled
 from .limits import RPM, digits_down, digits_up
 from .loops import Gains, Plant, current_loop
 
+SOURCE = ROOT / "tuning" / "start_trial.c"
 CURRENT_SHARE = 0.92
 """Start current over rated current: the start is short, so the rated current costs nothing, and more of it holds the rotor more firmly."""
 TRIP_HEADROOM = 1.3
@@ -175,6 +181,15 @@ def rpm_s_of_rate(motor: Motor, board: BoardFile, rate: float) -> float:
     return rate / 67108864.0 / board.pwm_period_s ** 2 * 60.0 / motor.pole_pairs
 
 
+@functools.cache
+def _program() -> Callable[..., float]:
+    """start_trial of start_trial.c: the sums of a trial are a hundred times those of all other rules together."""
+    array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+    found = compiled.library(SOURCE).start_trial
+    found.argtypes, found.restype = (array, array, ctypes.c_size_t, ctypes.c_size_t, ctypes.c_size_t, array), ctypes.c_double
+    return found
+
+
 def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lock_s: float, acceleration_rpm_s: float, end_rpm: float,
               angles: int = 24) -> Trial:
     """Integrates J dw/dt = Kt I(t) sin(P (forced - rotor)) - friction - load for all start angles, without load and with the start load.
@@ -186,35 +201,22 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
     ramp_s = end_rpm / acceleration_rpm_s
     count = int((lock_s + ramp_s + 0.1) / step)
     pull, pairs = motor.kt_nm_per_a * current_a, motor.pole_pairs
-    rotor = np.tile(np.arange(angles) * 2.0 * math.pi / angles, len(loads))
-    speed = np.zeros_like(rotor)
     dry = np.repeat(np.array(loads), angles) + motor.coulomb_nm
-    forced, turning = 0.0, 2.0 * math.pi * LOCK_TURNS / lock_s
-    hold = dry * step / inertia
-    locked, lowest = rotor, speed
-    kept: list[tuple[float, float, np.ndarray]] = []
+    columns = np.zeros((len(dry), 6))
+    rotor, locked, lowest = columns[:, 2], columns[:, 4], columns[:, 5]
+    columns[:, 0], columns[:, 1] = dry, dry * step / inertia
+    rotor[:] = np.tile(np.arange(angles) * 2.0 * math.pi / angles, len(loads))
+    shared = np.array([step, lock_s, pull, pairs, motor.viscous_nms, damping - motor.viscous_nms, 2.0 * math.pi * LOCK_TURNS / lock_s, acceleration_rpm_s,
+                       end_rpm * RPM * pairs, step / inertia, RPM])
     every = max(1, count // 800)
-    for k in range(count):
-        now = k * step
-        forced_speed = min(turning + max(now - lock_s, 0.0) * acceleration_rpm_s * RPM * pairs, end_rpm * RPM * pairs)
-        forced += forced_speed * step
-        drive = pull * min(now / lock_s, 1.0) * np.sin(forced - rotor) - motor.viscous_nms * speed - (damping - motor.viscous_nms) * (speed - forced_speed / pairs)
-        moving = np.abs(speed) > 1e-9
-        free = speed + step / inertia * drive
-        slowed = np.where(np.abs(free) <= hold, 0.0, free - np.sign(free) * hold)
-        speed = np.where(moving | (np.abs(drive) > dry), slowed, 0.0)
-        rotor = rotor + pairs * speed * step
-        lowest = np.minimum(lowest, speed)
-        if now <= lock_s:
-            locked = rotor - forced
-        if k % every == 0:
-            kept.append((now, forced_speed / pairs / RPM, speed / RPM))
+    kept = np.empty((-(-count // every), 2 + len(dry)))
+    forced = _program()(shared, columns, len(dry), count, every, kept)
     # The current passes a rotor while it is weak. One that follows the ramp ends within a quarter of a turn of it, and in the same turn as it began.
     turns = (rotor - forced) / (2.0 * math.pi)
     slipped = np.abs(turns - np.round(turns)) > 0.25
     lost = np.round(turns) - np.round(locked / (2.0 * math.pi)) < -0.5
     labels = [f"{360.0 * i / angles:.0f} deg, {load:.3g} N m" for load in loads for i in range(angles)]
-    times, forced_rpm, rotor_rpm = (np.array([row[i] for row in kept]) for i in range(3))
+    times, forced_rpm, rotor_rpm = kept[:, 0], kept[:, 1] / pairs / RPM, kept[:, 2:] / RPM
     last = times > times[-1] - 0.1 # the plateau at the end speed
     return Trial(times, rotor_rpm, forced_rpm, ~(slipped | lost), labels, float(np.abs(rotor_rpm[last] - forced_rpm[last, None]).max()),
                  max(0.0, -float(lowest.min())) / RPM)
