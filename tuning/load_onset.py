@@ -4,8 +4,11 @@ What decides at low speed is how soon the drive sees the load, for its rates fal
 before. The model has the shaft, the current loop as a lag, Equation 4's filter and the estimator's angle, the load observer at its three rates with
 its gate, and the speed controller; electrical rad/s, A, N m. Dead time and the converter's steps are left out, so MARGIN is added."""
 
+import ctypes
+import functools
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -13,7 +16,7 @@ from tools.bench import lowspeed
 from tools.common import paths
 from tools.common.param_rows import number, slow_periods
 
-from . import constants, limits
+from . import compiled, constants, limits
 from .design_result import Design
 from .limits import RPM
 from .loops import ESDQ_RATIO, FAST_GAIN, FULL_RATIO, LOADED_SHARE, QUIET_RATIO
@@ -29,10 +32,9 @@ AFTER_S, LONGEST_S = 0.6, 10.0
 LOST_RAD, BACK_SHARE = 1.2, 0.9
 """Angle error that no lock survives; share of its speed to which the rotor must have come back."""
 LOAD_FROM_LOST, GATE, GATE_LOADED = (number(name) for name in ("PARAM_LOAD_FROM_LOST", "GATE_SHARE", "GATE_LOADED_SHARE"))
-GATE_SPEED, GATE_GROWS, GATE_STEPS = (number(f"OBSERVER_GATE_{name}") for name in ("SPEED_SHIFT", "SHIFT", "STEPS"))
-FADE, HALF_LEVEL = 1.0 - 2.0 ** -number("OBSERVER_FAST_FADE_SHIFT"), number("OBSERVER_FAST_HALF_Q15") / 32768.0
-OPEN_SHARE = 2.0 ** (number("OBSERVER_GATE_OPEN_SHIFT") - 15.0)
-SUB_STEPS = 2
+LAW = (ESDQ_RATIO, FAST_GAIN, 2.0 ** number("OBSERVER_GATE_SPEED_SHIFT"), 2.0 ** number("OBSERVER_GATE_SHIFT"), number("OBSERVER_GATE_STEPS"),
+       1.0 - 2.0 ** -number("OBSERVER_FAST_FADE_SHIFT"), number("OBSERVER_FAST_HALF_Q15") / 32768.0, 2.0 ** (number("OBSERVER_GATE_OPEN_SHIFT") - 15.0), LOST_RAD)
+"""What follows the drive's own numbers in load_onset.c."""
 SPEEDS, PARTS = 60, 20
 """How many speeds between the nominal and the minimum one are tried; parts of a load."""
 
@@ -75,64 +77,13 @@ class Drive:
                    GATE * dead_v / m.psi_vs, GATE_LOADED * dead_v / m.psi_vs, d.value("MAXIMUM_CURRENT_A"))
 
 
-class Model:
-    """A motor on its way: its reference speed and a load that grows."""
-
-    def __init__(self, drive: Drive, reference: float) -> None:
-        self.drive, self.reference = drive, reference
-        self.speed, self.angle, self.e_d, self.e_q = reference, 0.0, 0.0, drive.psi * reference
-        self.seen, self.load_a, self.current_a = reference, drive.pull_a, drive.pull_a
-        self.quick, self.level, self.last = 0.0, 0.0, 0.0
-        self.lost = False
-
-    def step(self, load_nm: float) -> None:
-        """A slow step: rates and gate, the current that is asked for, the shaft, and what the observer learns."""
-        p, speed = self.drive, max(abs(self.seen), self.reference)
-        loaded = min(max((min(abs(self.load_a), abs(self.current_a)) - p.load_from_a) / p.load_from_a, 0.0), 1.0)
-        share = min(speed / p.full_rad_s, 1.0)
-        quiet = p.quiet * share
-        share += (min(2.0 * share, 1.0) - share) * loaded
-        rate = quiet + (p.loaded * share - quiet) * loaded
-        rate += (p.fast * share - rate) * self.quick
-        gate = (p.gate + (p.gate_loaded - p.gate) * loaded + speed / 2.0 ** GATE_SPEED) * (1.0 + self.level / 2.0 ** GATE_GROWS)
-        gain = p.gain * (1.0 + (FAST_GAIN - 1.0) * self.quick) * min(2.0 * share, 1.0)
-        seen = self._turn(self._within(gain * (self.reference - self.seen) + self.load_a), load_nm)
-        before = self.seen
-        self.seen += p.per_amp * p.step_s * (self.current_a - self.load_a)
-        innovation = seen - 0.5 * (before + self.seen)
-        self.seen += 2.0 * rate * innovation
-        self.load_a = self._within(self.load_a - rate ** 2 / (p.per_amp * p.step_s) * innovation)
-        self._answer(innovation, gate)
-
-    def _within(self, ampere: float) -> float:
-        return min(max(ampere, -self.drive.most_a), self.drive.most_a)
-
-    def _turn(self, asked_a: float, load_nm: float) -> float:
-        """Current, shaft and estimator over a step; returns the mean speed that the estimator has seen."""
-        p, dt, mean = self.drive, self.drive.step_s / SUB_STEPS, 0.0
-        k, current_k = 1.0 - math.exp(-min(p.filter_rad_s, ESDQ_RATIO * max(self.speed, 1.0)) * dt), 1.0 - math.exp(-p.current_rad_s * dt)
-        for _ in range(SUB_STEPS):
-            self.current_a += (asked_a - self.current_a) * current_k
-            self.e_d += k * (p.psi * self.speed * math.sin(self.angle) - self.e_d)
-            self.e_q += k * (p.psi * self.speed * math.cos(self.angle) - self.e_q)
-            estimated = (self.e_q - self.e_d) / p.psi
-            mean += estimated / SUB_STEPS
-            resisting = p.per_nm * load_nm + p.per_amp * p.pull_a if self.speed > 0.0 else 0.0
-            self.speed = max(self.speed + dt * (p.per_amp * self.current_a * math.cos(self.angle) - resisting), 0.0)
-            self.angle += (estimated - self.speed) * dt
-        self.lost = self.lost or abs(self.angle) > LOST_RAD
-        return mean
-
-    def _answer(self, innovation: float, gate: float) -> None:
-        """The quick rate after a large innovation, until the loop's own swing turns it back."""
-        is_open = self.quick > OPEN_SHARE
-        self.level = min(self.level + 4.0, 4.0 * GATE_STEPS) if is_open else max(self.level - 1.0, 0.0)
-        self.quick *= FADE
-        if abs(innovation) > gate and (not is_open or self.level < GATE_STEPS):
-            if is_open and innovation * self.last < 0.0:
-                self.level = GATE_STEPS
-            self.last = innovation
-            self.quick = max(self.quick, 1.0 if abs(innovation) > 1.5 * gate else HALF_LEVEL)
+@functools.cache
+def _program() -> Callable[..., float]:
+    """load_onset of load_onset.c: a speed to name takes a hundred runs of the model."""
+    array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+    found = compiled.library(paths.ROOT / "tuning" / "load_onset.c").load_onset
+    found.argtypes, found.restype = (array, ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.c_size_t), ctypes.c_double
+    return found
 
 
 def asked_nm(d: Design) -> float:
@@ -143,13 +94,10 @@ def asked_nm(d: Design) -> float:
 def held(d: Design, rpm: float, load_nm: float, inertia: float = 0.0, over_s: float = ONSET_S) -> bool:
     """Whether the rotor is back at its speed after a load has come within a time; with another inertia, if one is given."""
     drive = Drive.of(d, inertia or d.inertia_kgm2)
-    model = Model(drive, rpm * RPM * d.motor.pole_pairs)
-    bandwidth_hz = d.speed_loop.bandwidth_hz * min(2.0 * model.reference / drive.full_rad_s, 1.0)
-    for k in range(int((over_s + min(max(1.0 / bandwidth_hz, AFTER_S), LONGEST_S)) / drive.step_s)):
-        model.step(load_nm * min(k * drive.step_s / over_s, 1.0))
-        if model.lost:
-            return False
-    return model.speed > BACK_SHARE * model.reference
+    reference = rpm * RPM * d.motor.pole_pairs
+    bandwidth_hz = d.speed_loop.bandwidth_hz * min(2.0 * reference / drive.full_rad_s, 1.0)
+    steps = int((over_s + min(max(1.0 / bandwidth_hz, AFTER_S), LONGEST_S)) / drive.step_s)
+    return _program()(np.array([*astuple(drive), *LAW]), reference, load_nm, over_s, steps) > BACK_SHARE * reference
 
 
 def holds(d: Design, rpm: float, load_nm: float, inertia: float = 0.0) -> bool:
