@@ -18,6 +18,7 @@ linearised at the electrical speed w0, the estimated speed is F (1 + w0 I)/(1 + 
 estimator's R and L adds F/(1 + F w0 I) (dR + s dL)/psi times the q current, which is what makes a slow motor hunt.
 """
 
+import functools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
@@ -198,17 +199,40 @@ def observer_law(hz: np.ndarray, assumed: Plant, gains: Gains) -> tuple[np.ndarr
     return current(2.0 * r, -c) * mean, current(-b, 0.5 * r * r)
 
 
+class SpeedLoops:
+    """Open speed loops of many motors on one grid, with controllers made for `assumed`: what they share is computed once."""
+
+    def __init__(self, hz: np.ndarray, assumed: Plant) -> None:
+        self.hz, self.assumed = hz, assumed
+        self._currents, self._estimators, self._laws = (functools.cache(part) for part in (self._current, self._estimator, self._law))
+
+    def _current(self, true: Plant, gains: Gains) -> tuple[np.ndarray, np.ndarray]:
+        """The current that follows the one asked for, and the shaft that it turns."""
+        s, slow = 2j * np.pi * self.hz, gains.slow_s
+        inner = current_loop(self.hz, true, gains, 0.0)
+        current = inner / (1.0 + inner) * (1.0 - np.exp(-s * slow)) / (s * slow) * np.exp(-0.25 * s * slow)
+        return current, true.kt * true.pole_pairs / (true.inertia * s + true.viscous)
+
+    def _estimator(self, gains: Gains, omega_e: float, strength: float) -> tuple[np.ndarray, np.ndarray]:
+        return estimator(self.hz, gains, omega_e, strength)
+
+    def _law(self, gains: Gains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        per_speed, per_current = observer_law(self.hz, self.assumed, gains)
+        return -per_speed, per_current, np.exp(-0.5 * (2j * np.pi * self.hz) * gains.period_s)
+
+    def of(self, true: Plant, gains: Gains, omega_e: float) -> np.ndarray:
+        """The open loop of a motor `true` at a speed."""
+        assumed, s = self.assumed, 2j * np.pi * self.hz
+        current, shaft = self._currents(true, replace(gains, speed_kp=0.0, rate=0.0, esdq=0.0))
+        speed, error = self._estimators(replace(gains, speed_kp=0.0, rate=0.0), omega_e, true.psi / assumed.psi)
+        per_speed, per_current, late = self._laws(gains)
+        wrong = (true.rs - assumed.rs + s * (true.lq - assumed.lq)) / assumed.psi
+        return per_speed * current * (shaft * speed + wrong * error) * late / (1.0 - per_current * current)
+
+
 def speed_loop(hz: np.ndarray, true: Plant, assumed: Plant, gains: Gains, omega_e: float) -> np.ndarray:
     """Open speed loop of a motor `true` with controllers made for `assumed`."""
-    ts, s = gains.period_s, 2j * np.pi * hz
-    slow = gains.slow_s
-    inner = current_loop(hz, true, gains, 0.0)
-    current = inner / (1.0 + inner) * (1.0 - np.exp(-s * slow)) / (s * slow) * np.exp(-0.25 * s * slow)
-    shaft = true.kt * true.pole_pairs / (true.inertia * s + true.viscous)
-    speed, error = estimator(hz, gains, omega_e, true.psi / assumed.psi)
-    wrong = (true.rs - assumed.rs + s * (true.lq - assumed.lq)) / assumed.psi
-    per_speed, per_current = observer_law(hz, assumed, gains)
-    return -per_speed * current * (shaft * speed + wrong * error) * np.exp(-0.5 * s * ts) / (1.0 - per_current * current)
+    return SpeedLoops(hz, assumed).of(true, gains, omega_e)
 
 
 def margins(hz: np.ndarray, response: np.ndarray, asked: tuple[float, float] = (PHASE_MARGIN_DEG, GAIN_MARGIN_DB)) -> Margins:
@@ -370,6 +394,7 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
     """Bandwidth of the load observer, the largest up to `load_hz` with enough margin at every speed of `speeds_rad_s` (name: electrical
     rad/s) and every rate, and of the speed loop that goes with it: up to `largest_hz` and what is calm at the lowest speed."""
     grid = np.geomspace(0.05, 0.45 / base.slow_s, 400)
+    responses = SpeedLoops(grid, plant)
     whole, lowest = corners(plant, spread), min(speeds_rad_s.values())
     sets = {"quiet": whole, "loaded": [item for item in whole if (item[1].rs, item[1].psi) == (plant.rs, plant.psi)], "quick": whole[:1],
             "quick, L wrong": [(f"L x{factor:g}", replace(plant, ld=plant.ld * factor, lq=plant.lq * factor)) for factor in WRONG_L]}
@@ -385,11 +410,8 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
                 for name, true in sets[mode]:
                     yield f"{name}, {at}, {mode}", true, gains[mode.split(",", maxsplit=1)[0]], omega, asked
 
-    def response(true: Plant, gains: Gains, omega: float) -> np.ndarray:
-        return speed_loop(grid, true, plant, gains, omega)
-
     def worst_of(load: float, stop: bool, rates: tuple[str, ...] = tuple(SPEED_MARGINS)) -> tuple[Margins, str]:
-        return _worst(((label, lambda item=item: margins(grid, response(*item[:3]), item[3]))
+        return _worst(((label, lambda item=item: margins(grid, responses.of(*item[:3]), item[3]))
                        for label, *item in cases(load) if label.endswith(rates)), stop)
 
     candidates = [fixed_load_hz] if fixed_load_hz else _steps(load_hz, load_hz / 10.0, 0.98)
@@ -399,5 +421,5 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
         load, worst, label = _largest(candidates, lambda hz, stop: worst_of(hz, stop, right))
     found = {name: item for name, *item in cases(load)}
     shown = dict.fromkeys([next(name for name in found if name.endswith(mode)) for mode in SPEED_MARGINS] + [label])
-    curves = [Curve(name, grid, response(*found[name][:3]), margins(grid, response(*found[name][:3]), found[name][3])) for name in shown]
+    curves = [Curve(name, grid, responses.of(*found[name][:3]), margins(grid, responses.of(*found[name][:3]), found[name][3])) for name in shown]
     return LoopDesign(speed_hz(load), worst, label, curves[0].margins, curves, load, {mode: worst_of(load, False, (mode,)) for mode in SPEED_MARGINS})
