@@ -11,6 +11,9 @@ endif
 export CC PYTHON RUBY INSTALL
 # What would keep Python from finding tools/, and matplotlib from drawing into files.
 unexport PYTHONSAFEPATH MPLBACKEND
+# Hundreds of commands import the same modules: they are compiled once, into build/, whatever else was asked for.
+unexport PYTHONDONTWRITEBYTECODE
+export PYTHONPYCACHEPREFIX := $(CURDIR)/build/pycache
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -462,7 +465,7 @@ $T/%_runner.c: test/%.c test/unit/support/cmock.yml | $(gem_stamp)
 # The test and its runner are one unit: what both include is read once.
 $T/%.o: test/%.c $T/%_runner.c $T/flags | $B/params $B/law.c $(gem_stamp) $(golden_stamp)
 	@mkdir -p $(@D)
-	$(call say,cc,$<)$(test_compile) $(warnings) -Werror -Itest/$(*D) $(call own_defines,$<) -MMD -MP -include $< -c $T/$*_runner.c -o $@
+	$(call say,cc,$<)$(test_compile) $(warnings) -Werror -Itest/$(*D) $(call own_defines,$<) $(if $(filter unit/test_identify_motor,$*),$(long_run)) -MMD -MP -include $< -c $T/$*_runner.c -o $@
 
 $T/unity.o: $T/flags | $(gem_stamp)
 	$(quiet)$(test_compile) -w -c $(unity)/src/unity.c -o $@
@@ -525,6 +528,6 @@ sanitize: setup-run ## [tests] the demo under -fsanitize=undefined,address [SCEN
 	    $(front_end) run $(scenario) --library "$$library" --no-plots $(out)
 
 clean: ## [upkeep] remove what was built and run; build/gems and build/setup stay
-	@rm -rf build/board build/host* build/test* build/target* build/size build/golden build/run
+	@rm -rf build/board build/host* build/test* build/target* build/size build/golden build/run build/tuner build/pycache
 
 -include $B/params.d $(firmware_objects:.o=.d) $(part_objects:.o=.d) $(board_objects:.o=.d) $(c_executables:%=%.d)
