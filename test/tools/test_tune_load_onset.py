@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from tune_support import HURST, designed, of
 
@@ -30,6 +31,23 @@ def test_a_lighter_rotor_a_larger_or_a_quicker_load_needs_more_speed():
     assert not load_onset.held(light, 150.0, TORQUE_NM) and load_onset.held(light, 150.0, TORQUE_NM, over_s=8.0)
     assert load_onset.held(light, 150.0, TORQUE_NM, inertia=2e-5)
     assert 0.0 < load_onset.most_nm(light, 150.0, TORQUE_NM) < TORQUE_NM == load_onset.most_nm(usual, 150.0, TORQUE_NM)
+
+
+DRIVE = (0.0004, 149700.0, 2500000.0, 0.07082, 0.007983, 1260.0, 6283.0, 256.0, 0.03986, 0.08294, 0.2765, 0.0005457, 0.0625, 15.63, 3.608, 2.75)
+LAW = (5.0, 1.8, 32.0, 256.0, 1000.0, 0.984375, 0.375, 0.125, 1.2)
+"""Of a light rotor, in the order of Drive's fields and of load_onset.LAW."""
+
+
+@pytest.mark.parametrize("reference, load_nm, over_s, inertia, steps, left", [
+    (80.0, 0.02, 0.5, 1.0, 400, 55.792423), (80.0, 0.02, 0.5, 1.0, 1500, 79.959013), (80.0, 0.08, 0.5, 1.0, 1500, -1.0), (160.0, 0.08, 0.5, 1.0, 400, 124.759448),
+    (160.0, 0.08, 0.1, 1.0, 400, 157.023892), (160.0, 0.11, 0.05, 1.0, 400, -1.0), (600.0, 0.08, 0.5, 1.0, 400, 544.067796), (600.0, 0.08, 0.05, 0.4, 400, 599.969901),
+    (80.0, 0.04, 8.0, 1.0, 400, 64.543248), (80.0, 0.04, 8.0, 1.0, 1500, 76.272668), (300.0, 0.08, 0.02, 0.3, 400, 294.351707)])
+def test_the_model_leaves_the_speed_that_its_equations_gave_in_another_language(reference, load_nm, over_s, inertia, steps, left):
+    """The numbers are those of the same model in Python, with which the C one agreed to the last bit."""
+    drive = np.array([*DRIVE, *LAW])
+    drive[[1, 2]] /= inertia
+    drive[11] *= inertia
+    assert load_onset._program()(drive, reference, load_nm, over_s, steps) == pytest.approx(left, abs=2e-6)
 
 
 def test_what_is_asked_for_is_the_rated_torque_as_far_as_the_current_allows():

@@ -88,6 +88,37 @@ def test_what_is_followed_and_what_is_lost(trial, free, loaded):
     assert tried(*trial).followed.tolist() == [free] * 12 + [loaded] * 12
 
 
+def step_by_step(motor, inertia: float, damping: float, current_a: float, lock_s: float, acceleration_rpm_s: float, end_rpm: float, angle: float, load_nm: float):
+    """try_start of one angle and load in plain words: speed in rpm after each step, and the rotor against the forced angle at the end."""
+    rpm, pairs, dry = math.pi / 30.0, motor.pole_pairs, load_nm + motor.coulomb_nm
+    step = min(400e-6, 0.1 / start.natural_rad_s(motor, current_a, inertia))
+    rotor, speed, forced, speeds = angle, 0.0, 0.0, []
+    for k in range(int((lock_s + end_rpm / acceleration_rpm_s + 0.1) / step)):
+        now, turning = k * step, 2.0 * math.pi * start.LOCK_TURNS / lock_s
+        wanted = min(turning + max(now - lock_s, 0.0) * acceleration_rpm_s * rpm * pairs, end_rpm * rpm * pairs)
+        forced += wanted * step
+        torque = motor.kt_nm_per_a * current_a * min(now / lock_s, 1.0) * math.sin(forced - rotor) - motor.viscous_nms * speed \
+            - (damping - motor.viscous_nms) * (speed - wanted / pairs)
+        free = speed + step / inertia * torque
+        slowed = math.copysign(max(abs(free) - dry * step / inertia, 0.0), free)
+        speed = slowed if abs(speed) > 1e-9 or abs(torque) > dry else 0.0
+        rotor += pairs * speed * step
+        speeds.append(speed / rpm)
+    return speeds, rotor - forced
+
+
+@pytest.mark.parametrize("load_nm, acceleration", [(0.0, 715.0), (0.03, 715.0), (1.05 * PULL_NM, 715.0), (0.02, 5e4)])
+def test_a_trial_is_the_rotor_s_equation_step_by_step(load_nm, acceleration):
+    trial = tried(load_nm, acceleration)
+    for column, (angle, load) in enumerate((k * math.pi / 6.0, load) for load in (0.0, load_nm) for k in range(12)):
+        speeds, error = step_by_step(MOTOR, 5.5e-6, 4e-5, 1.41, 1.0, acceleration, 1000.0, angle, load)
+        every = max(1, len(speeds) // 800)
+        assert trial.speed_rpm[:, column].tolist() == approx(speeds[::every], rel=1e-6, abs=1e-6)
+        turns = error / (2.0 * math.pi)
+        assert abs(turns - round(turns)) <= 0.25 or not trial.followed[column]
+        assert -min(speeds) <= trial.back_rpm + 1e-6
+
+
 def test_the_speed_backwards_is_that_of_the_worst_angle_and_a_heavy_rotor_s_is_small():
     assert 0.0 < tried().back_rpm < 260.0 and tried().back_rpm == approx(-tried().speed_rpm.min(), rel=0.1)
     assert tried(inertia=36 * 5.5e-6).back_rpm < 0.5 * tried().back_rpm
