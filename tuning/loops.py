@@ -272,25 +272,28 @@ def corners(plant: Plant, spread: dict[str, tuple[float, float]] | None = None) 
     return found
 
 
-def _worst(cases: Iterable[tuple[str, Callable[[], Margins]]], stop: bool) -> tuple[Margins, str]:
-    """The case with the least phase margin beyond what is asked of it, with the least gain margin of those of which as much is asked; with
-    `stop`, the first one that is not enough."""
+def _worst(cases: Iterable[tuple[str, Callable[[], Margins]]], first: str | None = None) -> tuple[Margins, str]:
+    """The case with the least phase margin beyond what is asked of it, with the least gain margin of those of which as much is asked; with the
+    name of the case to look at `first`, one that is not enough, if there is any."""
     found: list[tuple[str, Margins]] = []
-    for name, compute in cases:
+    for name, compute in cases if first is None else sorted(cases, key=lambda case: case[0] != first):
         found.append((name, compute()))
-        if stop and not found[-1][1].enough:
+        if first is not None and not found[-1][1].enough:
             break
     label, worst = min(found, key=lambda item: (item[1].enough, item[1].slack_deg))
     return replace(worst, gain_db=min(each.gain_db for _, each in found if each.asked_db == worst.asked_db)), label
 
 
-def _largest(candidates: list[float], worst_of: Callable[[float, bool], tuple[Margins, str]],
+def _largest(candidates: list[float], worst_of: Callable[[float, str | None], tuple[Margins, str]],
              nearly_deg: float = 0.0) -> tuple[float, Margins, str]:
-    """The largest candidate with enough margin; if there is none, the first one that is within `nearly_deg` of the most."""
+    """The largest candidate with enough margin; if there is none, the first one that is within `nearly_deg` of the most. The case that has refused
+    one candidate is the likeliest to refuse the next."""
+    refused_by = ""
     for candidate in candidates:
-        if worst_of(candidate, True)[0].enough:
-            return candidate, *worst_of(candidate, False)
-    results = [(candidate, *worst_of(candidate, False)) for candidate in candidates[:: max(1, len(candidates) // 20)]]
+        found, refused_by = worst_of(candidate, refused_by)
+        if found.enough:
+            return candidate, *worst_of(candidate, None)
+    results = [(candidate, *worst_of(candidate, None)) for candidate in candidates[:: max(1, len(candidates) // 20)]]
     most = max(item[1].slack_deg for item in results)
     return next(item for item in results if item[1].slack_deg >= most - nearly_deg)
 
@@ -328,10 +331,10 @@ def design_current(plant: Plant, spread: dict[str, tuple[float, float]], base: G
     cases = {f"{name}, {'standstill' if w == 0.0 else 'top speed'}" + (f", {axis} axis" if len(axes) > 1 else ""): (p, w, axis)
              for name, p in corners(plant, spread) if p.psi == plant.psi for w in (0.0, top_rad_s) for axis in axes}
 
-    def worst_of(bandwidth_hz: float, stop: bool) -> tuple[Margins, str]:
+    def worst_of(bandwidth_hz: float, first: str | None) -> tuple[Margins, str]:
         gains = current_gains(plant, bandwidth_hz, base)
         return _worst(((label, lambda case=case: margins(grid, current_loop(grid, case[0], gains, *case[1:])))
-                       for label, case in cases.items()), stop)
+                       for label, case in cases.items()), first)
 
     cap = min(CURRENT_CAP / base.period_s, largest_hz)
     above = [f for f in _steps(min(CURRENT_TOP / base.period_s, largest_hz), cap, 0.95) if f > cap][::-1]
@@ -410,16 +413,16 @@ def design_speed(plant: Plant, spread: dict[str, tuple[float, float]], base: Gai
                 for name, true in sets[mode]:
                     yield f"{name}, {at}, {mode}", true, gains[mode.split(",", maxsplit=1)[0]], omega, asked
 
-    def worst_of(load: float, stop: bool, rates: tuple[str, ...] = tuple(SPEED_MARGINS)) -> tuple[Margins, str]:
+    def worst_of(load: float, first: str | None, rates: tuple[str, ...] = tuple(SPEED_MARGINS)) -> tuple[Margins, str]:
         return _worst(((label, lambda item=item: margins(grid, responses.of(*item[:3]), item[3]))
-                       for label, *item in cases(load) if label.endswith(rates)), stop)
+                       for label, *item in cases(load) if label.endswith(rates)), first)
 
     candidates = [fixed_load_hz] if fixed_load_hz else _steps(load_hz, load_hz / 10.0, 0.98)
     load, worst, label = _largest(candidates, worst_of)
     if not worst.enough: # a rotor so heavy that no bandwidth has it all hardly ever gives a large innovation: L is right then
         right = tuple(mode for mode in SPEED_MARGINS if mode != "quick, L wrong")
-        load, worst, label = _largest(candidates, lambda hz, stop: worst_of(hz, stop, right))
+        load, worst, label = _largest(candidates, lambda hz, first: worst_of(hz, first, right))
     found = {name: item for name, *item in cases(load)}
     shown = dict.fromkeys([next(name for name in found if name.endswith(mode)) for mode in SPEED_MARGINS] + [label])
     curves = [Curve(name, grid, responses.of(*found[name][:3]), margins(grid, responses.of(*found[name][:3]), found[name][3])) for name in shown]
-    return LoopDesign(speed_hz(load), worst, label, curves[0].margins, curves, load, {mode: worst_of(load, False, (mode,)) for mode in SPEED_MARGINS})
+    return LoopDesign(speed_hz(load), worst, label, curves[0].margins, curves, load, {mode: worst_of(load, None, (mode,)) for mode in SPEED_MARGINS})
