@@ -152,7 +152,7 @@ void BOARD_ISR _T2Interrupt(void)
     drive_samples_t raw;
     if (board_is_late) {
         board_is_late = 0;
-        drive_raise(&board_drive, FAULT_ISR_OVERRUN);
+        drive_raise_at_once(&board_drive, FAULT_ISR_OVERRUN);
     }
     raw.i_a = (int16_t)ADC1BUF1;
     raw.i_b = (int16_t)ADC1BUF2;
@@ -201,7 +201,7 @@ static void board_trap(drive_fault_t fault)
 {
     pwm_outputs_off();
     board_trap_intcon1 = INTCON1;
-    drive_raise(&board_drive, fault);
+    drive_raise_at_once(&board_drive, fault);
     reset_keep((uint16_t)fault);
 }
 

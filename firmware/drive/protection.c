@@ -8,7 +8,7 @@ INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
 {
     const int16_t limit = p->overcurrent_q13;
     if (qm_beyond(d->phases_q13.a, limit) || qm_beyond(d->phases_q13.b, limit) || qm_beyond(d->phases_q13.c, limit)) {
-        drive_raise(d, FAULT_OVERCURRENT_SW);
+        drive_raise_at_once(d, FAULT_OVERCURRENT_SW);
         return 1;
     }
     return 0;

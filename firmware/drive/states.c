@@ -25,7 +25,7 @@ static void states_write(drive_t *d, drive_state_t next)
     d->periods = 0;
 }
 
-void drive_raise(drive_t *d, drive_fault_t fault)
+INLINE void drive_raise_at_once(drive_t *d, drive_fault_t fault)
 {
     d->command.run = 0;
     if (d->fault == (uint16_t)FAULT_NONE) {
@@ -33,6 +33,11 @@ void drive_raise(drive_t *d, drive_fault_t fault)
         SELFTEST_KEEP(d, fault, fault);
     }
     states_write(d, DRIVE_FAULT);
+}
+
+NOINLINE void drive_raise(drive_t *d, drive_fault_t fault)
+{
+    drive_raise_at_once(d, fault);
 }
 
 void drive_enter(drive_t *d, drive_state_t next)

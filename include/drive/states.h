@@ -114,6 +114,9 @@ uint16_t drive_latch_fault(drive_t *d);
 /** Stops at once and keeps the code of the first fault. Any context: background, interrupt, trap. */
 void drive_raise(drive_t *d, drive_fault_t fault);
 
+/** The same in place: for handlers, which save no more than they use. */
+void drive_raise_at_once(drive_t *d, drive_fault_t fault);
+
 /** Forgets the fault. Control interrupt only. @return the next state: STOPPED, or the calibration that it has interrupted */
 drive_state_t drive_clear_fault(drive_t *d);
 
