@@ -56,5 +56,13 @@ class Page:
     def click(self, selector: str) -> None:
         self.one(selector).click()
 
+    def axe(self, root) -> tuple[int, list[str]]:
+        """Rules of accessibility that hold, and what breaks one."""
+        script, = (root / "build/setup").glob("axe-core-*.js")
+        self.run(script.read_text(encoding="utf-8"))
+        return self.driver.execute_async_script("""const done = arguments[arguments.length - 1];
+            axe.run({ runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"] }).then(({ violations, passes }) => done([passes.length,
+                violations.flatMap((v) => v.nodes.map((n) => `${v.id}: ${n.html.slice(0, 100)}`))]), (error) => done([0, [String(error)]]))""")
+
     def slide(self, key: str, value: float) -> None:
         self.run("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", self.one(f'input[name="{key}"]'), value)

@@ -7,7 +7,6 @@ import glob
 import json
 import math
 import os
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -206,12 +205,3 @@ def _number(value: float) -> str:
 
 def _list(values: Any) -> str:
     return "[" + ", ".join("0.00" if value == "-0.00" else value for value in values) + "]"
-
-
-def with_values(header: str, values: Mapping[str, str]) -> str:
-    """The text of a userparams.h with other values, comments and order kept."""
-    for name, value in values.items():
-        header, found = re.subn(rf"^([ \t]*#[ \t]*define[ \t]+{name}[ \t]+)(\S+)", lambda m: m[1] + value, header, flags=re.MULTILINE)
-        if found != 1:
-            raise UserError(f"'{name}' is not defined once", "userparams.h", "give a complete userparams.h")
-    return header

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.bench import build, command_common, report
-from tools.common import board_file, board_keys, motor_file, output, paths, workers
+from tools.common import board_file, board_keys, motor_file, output, param_rows, paths, workers
 from tools.bench.board import Library
 from tools.common.errors import UserError
 from tools.common.progress import Progress, waiting
@@ -141,7 +141,7 @@ class _Work:
         self.motor_s = 0.0
         known = defines(header)
         top_rpm = highest_speed(known)
-        library = self._library("search", fw_tables.with_values(header, {"MAXIMUM_SPEED_RPM": f"{top_rpm:.0f}"}), ["PARAMS_IN_RAM"])
+        library = self._library("search", param_rows.with_values(header, {"MAXIMUM_SPEED_RPM": f"{top_rpm:.0f}"}), ["PARAMS_IN_RAM"])
         self.params = library.params
         self.values = board_keys.resolve(layers, library.keys)
         limit_a = min(self.params["MAXIMUM_CURRENT_A"] * ID_SHARE, motor.maximum_current_a)
@@ -193,7 +193,7 @@ class _Work:
         wanted = self.job.goal.maximum_rpm
         top = math.floor(tables.maximum_speed_rpm)
         values = {**tables.parameters(), "MAXIMUM_SPEED_RPM": f"{max(top, round(self.params['NOMINAL_SPEED_RPM']) + 1):.0f}"}
-        library = self._library("check", fw_tables.with_values(self.header, values), [])
+        library = self._library("check", param_rows.with_values(self.header, values), [])
         speeds = [wanted] if wanted <= top else []
         speeds += [top] if top > wanted + SPEED_STEP_RPM or not speeds else []
         job = replace(self.job, library=library.path, tables=tables)

@@ -1,5 +1,6 @@
 """Parameters kept over a reset, on the image in the simulator: the chip's own flash, its stalls, its watchdog, and the supply that fails. Needs XC16."""
 
+import contextlib
 import ctypes
 from collections.abc import Iterator
 
@@ -7,11 +8,13 @@ import pytest
 
 import xc16
 from chip import library as _library # the interface of the core
+from tools.common import paths
 from tools.common.x_macro import rows
 from tools.image import crc, device, program
 from tools.live import board as live_board
 from tools.live import lnet
 from tools.live.symbols import Symbols
+from tools.live.tuning import Tuning
 
 pytestmark = pytest.mark.xc16
 DEFINES = "-DPARAMS_IN_RAM -DPARAMS_KEPT=1"
@@ -100,6 +103,21 @@ def bench(parts: live_board.Parts) -> Iterator[Bench]:
     made = Bench(parts)
     yield made
     made.live.close()
+
+
+def test_the_page_of_make_live_knows_the_image_s_parameters_by_name_and_value(parts):
+    """What it compiles for the PC is what the compiler of the image has put there."""
+    host = Symbols.read(live_board.parts(defines=DEFINES).symbols)
+    tuning = Tuning.of(paths.ROOT / "userparams.h", [*DEFINES.replace("-D", "").split(), live_board.SCOPE], host, Symbols.read(parts.symbols))
+    try:
+        members = tuning._members(tuning.built)
+        with contextlib.closing(live_board.LiveBoard(parts)) as live:
+            live.run(0.2)
+            live.board.uart_take()
+            there = tuning._read_back(lnet.connect(live_board.BoardStream(live)), list(members))
+    finally:
+        tuning.end()
+    assert len(members) > 150 and {name: value for name, value in zip(members, there) if members[name] != value} == {}
 
 
 def test_the_image_has_its_crc_before_the_pages_and_nothing_in_them(parts: live_board.Parts) -> None:

@@ -15,7 +15,7 @@ from tune_support import HURST, command, motor_path
 
 from tools.bench import build
 from tools.bench.board import BoardError, Library
-from tools.common import board_file, board_keys, motor_file, paths, workers
+from tools.common import board_file, board_keys, motor_file, param_rows, paths, workers
 from tools.common.errors import UserError
 from tuning import fw_search, fw_tables, fw_tune
 from tuning.fw_bench import SIGNALS, Bench, Fault, Point, reduced
@@ -381,11 +381,11 @@ KNOWN = fw_tune.defines(HEADER)
 
 
 def test_values_change_and_comments_stay():
-    text = fw_tables.with_values(HEADER, {"FW_START_SPEED_RPM": "2345", "IDREF_SPEED1": "-0.77"})
+    text = param_rows.with_values(HEADER, {"FW_START_SPEED_RPM": "2345", "IDREF_SPEED1": "-0.77"})
     assert fw_tune.defines(text) == KNOWN | {"FW_START_SPEED_RPM": 2345.0, "IDREF_SPEED1": -0.77}
     assert text.count("/*") == HEADER.count("/*")
     with pytest.raises(UserError, match="NO_SUCH_NAME"):
-        fw_tables.with_values(HEADER, {"NO_SUCH_NAME": "1"})
+        param_rows.with_values(HEADER, {"NO_SUCH_NAME": "1"})
 
 
 def test_numbers_are_read_and_the_highest_speed_is_where_the_format_of_speeds_or_of_the_back_emf_ends():

@@ -1,6 +1,7 @@
 """Kept parameters on the page of make live: what it says of a virtual board's flash and of a real board's, and the two buttons."""
 
 import contextlib
+import ctypes
 import signal
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from tools.live.pace import Pacemaker
 from tools.live.real_board import RealBoard
 from tools.live.recording import Origin
 from tools.live.symbols import Symbols
+from tools.live.tuning import Tuning
 from tools.live.virtual_board import VirtualBoard
 
 GAIN = "board_params.speed_kp_q13"
@@ -156,6 +158,28 @@ def test_while_the_motor_turns_it_is_refused_by_its_reason(bench: Bench) -> None
     bench.do(keep=True)
     bench.logs("keep: refused: only in STOPPED with the bridge off")
     bench.says(state="NONE")
+
+
+def test_a_board_at_a_serial_port_is_tuned_over_its_line() -> None:
+    made_of, symbols = kept_parts(), Symbols.read(kept_parts().symbols)
+    defines = [*KEPT_DEFINES.replace("-D", "").split(), board.SCOPE]
+    tuning = Tuning.of(paths.ROOT / "userparams.h", defines, symbols, symbols)
+    virtual = VirtualBoard(made_of.library, Origin(made_of.motor, made_of.board, defines, {}))
+    maker = Pacemaker(virtual, lambda frame: None)
+    maker.start()
+    real = RealBoard(virtual.line, "the motor", symbols, made_of.library.params, tuning)
+    try:
+        real.start(lambda message: None)
+        real.tuning.ask(["SPEED_BANDWIDTH_HZ", "9.5"])
+        wanted = tuning.compiler.build({"SPEED_BANDWIDTH_HZ": "9.5"}).params
+        there = (ctypes.c_ubyte * len(wanted)).in_dll(virtual.library.c, "board_params")
+        assert wanted != tuning.built.params == bytes(there)
+        until(lambda: bytes(there) == wanted, "it is not written", 30.0)
+        assert set(real.hello()["tuning"]) == {"subjects", "changed", "undo", "lost", "foreign"} and real.header() == tuning.saved()
+        until(lambda: (real.run(0.0), real.frame(), any(line["text"] == "SPEED_BANDWIDTH_HZ 9.5" for line in real.log))[2], "it is not logged")
+    finally:
+        real.end()
+        maker.end()
 
 
 # ---- the virtual board's flash in a file ---------------------------------------------------------------------------------------

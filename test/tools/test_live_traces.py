@@ -387,7 +387,7 @@ def test_the_record_of_a_fault_comes_by_itself_with_cause_and_remedy_beside_it(p
     assert message(page).startswith("CSV: no trace yet")
     page.run("return new Promise((done) => setTimeout(done, 500))") # until the rows before a fault are there
     page.click("[data-fault=open_b]")
-    page.wait("return document.querySelector('#scope-why b')?.textContent === 'OPEN_PHASE'", "no record")
+    page.wait("return document.querySelector('#scope-why b')?.textContent === 'OPEN_PHASE'", "no record", 60.0)
     row = next(row for row in drive_tables.faults() if row.name == "OPEN_PHASE")
     assert page.text("#scope-why") == f"OPEN_PHASE, at 0 ms: {row.cause}. Remedy: {row.remedy}."
     item = inside(page, "views.scope.trace")
@@ -412,7 +412,7 @@ def test_a_firmware_without_the_scope_shows_the_rows_of_its_fault_recorder_and_n
         page.click("[data-button=S2]")
         page.state("CLOSED")
         page.click("[data-fault=open_b]")
-        page.wait("return document.querySelector('#scope-why b')?.textContent === 'OPEN_PHASE'", "no record")
+        page.wait("return document.querySelector('#scope-why b')?.textContent === 'OPEN_PHASE'", "no record", 60.0)
         assert "Remedy: check the motor's wires" in page.text("#scope-why") and inside(page, places) == before
         item = inside(page, "views.scope.trace")
         assert item["names"] == ["i_a", "i_b", "v_d", "v_q", "angle", "speed", "bus", "state"] and len(item["rows"]) == 64

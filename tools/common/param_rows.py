@@ -2,6 +2,7 @@
 
 import functools
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from . import paths, tuned_rows
@@ -76,3 +77,18 @@ def parameters() -> dict[str, Parameter]:
 def modes() -> dict[str, str]:
     """Every mode and what it does, in the order of include/drive/modes/mode_table.h."""
     return {name: meaning for name, meaning in rows("include", "drive/modes/mode_table.h", "MODE_TABLE", "#name meaning")}
+
+
+def with_values(header: str, values: Mapping[str, str]) -> str:
+    """The text of a userparams.h with other values, comments and order kept."""
+    for name, value in values.items():
+        header, found = re.subn(rf"^([ \t]*#[ \t]*define[ \t]+{name}[ \t]+)(\S+)", lambda m: m[1] + value, header, flags=re.MULTILINE)
+        if found != 1:
+            raise UserError(f"'{name}' is not defined once", "userparams.h", "give a complete userparams.h")
+    return header
+
+
+def texts_of(header: str) -> dict[str, str]:
+    """The value of each parameter that the text of a userparams.h defines, as it is written there."""
+    found = re.findall(r"^[ \t]*#[ \t]*define[ \t]+(\w+)[ \t]+(\S+)", header, re.MULTILINE)
+    return {name: text for name, text in found if name in parameters()}

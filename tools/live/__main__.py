@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tools.bench import command_common
+from tools.bench import build, command_common
 from tools.bench.scenario import Scenario
 from tools.bench.scenario_file import MOTOR
 from tools.common import command_line, paths
@@ -17,6 +17,8 @@ from .pace import PACES
 
 if TYPE_CHECKING:
     from . import board
+    from .symbols import Symbols
+    from .tuning import Tuning
 
 IMAGE = paths.shown(paths.ROOT / "build" / "target" / "foc33.elf")
 
@@ -58,7 +60,8 @@ def _real(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any
     from .real_board import RealBoard
     from .symbols import Symbols
     symbols = Symbols.read(options.elf or IMAGE)
-    return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params)
+    tuning = _tuning(options, parts, symbols)
+    return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params, tuning)
 
 
 def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any]:
@@ -72,7 +75,18 @@ def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], 
     words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
     origin = Origin(parts.motor, parts.board, with_scope(command_common.macros(options.defines)), words)
     symbols = Symbols.read(parts.symbols)
-    return lambda: VirtualBoard(parts.library, origin, symbols)
+    tuning = _tuning(options, parts, symbols)
+    return lambda: VirtualBoard(parts.library, origin, symbols, tuning)
+
+
+def _tuning(options: argparse.Namespace, parts: "board.Parts", symbols: "Symbols") -> "Tuning | None":
+    """For a firmware whose parameters are variables."""
+    from .board import with_scope
+    from .symbols import Symbols
+    from .tuning import Tuning
+    folder = command_common.header_for(options)
+    header = ((build.header_folder(folder) if folder else None) or paths.ROOT) / build.HEADER
+    return Tuning.of(header, with_scope(command_common.macros(options.defines)), Symbols.read(parts.symbols), symbols)
 
 
 def _parts(options: argparse.Namespace) -> "board.Parts":

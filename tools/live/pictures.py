@@ -91,6 +91,15 @@ def _unmeasured(driver: Any) -> None:
     _slide(driver, "load.constant_nm", 0.05)
 
 
+def _tuned(driver: Any) -> None:
+    """Two parameters of the control loops are changed."""
+    driver.execute_script("const s = document.getElementById('tuning-subject'); s.value = [...s.options].find((o) => o.text === 'Control loops').value; s.onchange()")
+    for name, value in (("SPEED_BANDWIDTH_HZ", "9.5"), ("LOAD_BANDWIDTH_HZ", "100")):
+        driver.execute_script("""const row = [...document.querySelectorAll('.parameter')].find((row) => row.querySelector('b').textContent === arguments[0]);
+            row.querySelector('input').value = arguments[1]; row.querySelector('input').onchange()""", name, value)
+        _until(driver, f"'{name}' in window.eval('views.tuning.told.changed')")
+
+
 def _faulty(driver: Any) -> None:
     """The load stays, and a wire breaks."""
     _click(driver, "[data-fault=open_b]")
@@ -134,6 +143,10 @@ def _write() -> int:
                 _unmeasured(driver)
                 _faulty(driver)
                 _save(driver, "live-fault", SMALL)
+            with _page(driver, "--defines=-DPARAMS_IN_RAM"):
+                _until(driver, "f.state === 'STOPPED'")
+                _tuned(driver)
+                _save_part(driver, "live-tuning", "#tuning-card")
             browser.resize(driver, *SIZE)
             with _program("tools.live.board") as told:
                 port, elf = (line.replace(",", " ").split()[place] for line, place in zip(told, (2, 1)))

@@ -15,6 +15,7 @@ from .kept import Kept
 from .pace import FRAME_S
 from .scope import Scope
 from .symbols import Symbols
+from .tuning import FIXED, Tuning
 from .watch import Watch
 
 LEASE_MS, RENEW_S = 2000, 0.5
@@ -41,10 +42,10 @@ class Remote:
 class RealBoard:
     """As VirtualBoard for the server; time passes by itself."""
 
-    def __init__(self, port: Any, title: str, symbols: Symbols, params: Mapping[str, float]) -> None:
+    def __init__(self, port: Any, title: str, symbols: Symbols, params: Mapping[str, float], tuning: Tuning | None = None) -> None:
         self.port, self.title, self.symbols, self.params = port, title, symbols, params
         self.watch = Watch(symbols, params)
-        self.kept = Kept.of(symbols)
+        self.kept, self.tuning = Kept.of(symbols), tuning
         self.begun_s = time.monotonic()
         self.time_s = 0.0
         self.values: dict[str, float] | None = None
@@ -76,12 +77,15 @@ class RealBoard:
     def start(self, publish: Callable[[dict[str, Any]], None]) -> None:
         """The thread that talks to the board."""
         self.scope = Scope(self._link, self.symbols, self.params, publish, self._beat)
+        if self.tuning is not None:
+            self.tuning.publish = publish
         self.scope.start()
 
     def end(self) -> None:
         """A motor that the page has started stops in order, as the lease runs out."""
-        if self.scope is not None:
-            self.scope.end()
+        for part in (self.scope, self.tuning):
+            if part is not None:
+                part.end()
 
     def paced(self, pace: float) -> None:
         """Its time is everybody's."""
@@ -103,8 +107,9 @@ class RealBoard:
             self._write(link, "clear_fault", 1)
         if self.remote is not None:
             self._command(link, self.remote, now_s)
-        if self.kept is not None:
-            self.kept.beat(link)
+        for part in (self.kept, self.tuning):
+            if part is not None:
+                part.beat(link)
 
     def _command(self, link: lnet.Lnet, remote: Remote, now_s: float) -> None:
         """Renews the lease; where S2 has taken the command, it is S2's."""
@@ -181,7 +186,7 @@ class RealBoard:
         return {"virtual": False, "motor": self.title, "board": str(self.port), "defines": [], "sliders": {}, "throws": [],
                 "remote": {"low": low, "high": high}, "max_current_a": self.params["MAXIMUM_CURRENT_A"], "nominal_bus_v": self.params["NOMINAL_BUS_V"],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(False), "kept": self.kept is not None, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
+                "panels": view.panels(False), "kept": self.kept is not None, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:
         """How things stand, as far as the board has told."""
@@ -193,8 +198,9 @@ class RealBoard:
             new = [self._strip_row(values)]
             self.strip.extend(new)
             self.rows.append({"time_s": round(self.time_s, 3)} | values)
-        while self.kept is not None and self.kept.news:
-            self.note(self.kept.news.popleft())
+        for part in (self.kept, self.tuning):
+            while part is not None and part.news:
+                self.note(part.news.popleft())
         told, self.told = self.told, self.lines
         reasons = int(values["limits"]) if values else 0
         return {"t": round(self.time_s, 3), "run": 1, "state": "" if silent else self.state, "fault": self.fault or "NONE",
@@ -240,6 +246,12 @@ class RealBoard:
     def scenario(self) -> str:
         """Only a virtual board can repeat."""
         raise UserError("a real board has no scenario", "page", "save its CSV")
+
+    def header(self) -> str:
+        """userparams.h with what has been changed."""
+        if self.tuning is None:
+            raise UserError("no parameter can change", "page", FIXED)
+        return self.tuning.saved()
 
     def csv(self) -> str:
         """What was read, a row a frame, of the last ten minutes."""

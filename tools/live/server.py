@@ -23,7 +23,7 @@ AHEAD = 2
 MOST_ROWS, MOST_LINES = 2000, 200
 """Of curves and log in such a frame."""
 LONGEST_MESSAGE = 4096
-SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv")}
+SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv"), "header": ("userparams.h", "text/x-c")}
 
 
 class Tab:
@@ -76,6 +76,7 @@ class Server:
         self.port = 0
         self.loop = asyncio.get_running_loop()
         self.over = asyncio.Event()
+        self.tasks: set[asyncio.Task] = set()
         self.pacemaker = Pacemaker(bench, self.publish, pace)
         bench.start(self.publish)
         bench.paced(pace)
@@ -149,12 +150,23 @@ class Server:
                 tab.seen()
             elif isinstance(command, dict) and set(command) == {"scope"} and self.bench.scope is not None:
                 self.bench.scope.ask(command["scope"])
+            elif isinstance(command, dict) and set(command) == {"tune"} and self.bench.tuning is not None:
+                task = asyncio.create_task(self._tune(command["tune"], tab)) # the compiler takes its time: what else this tab asks does not wait
+                self.tasks.add(task)
+                task.add_done_callback(self.tasks.discard)
             elif isinstance(command, dict) and set(command) == {"pace"}:
                 await self._ask(lambda: self._set_pace(command["pace"]))
             else:
                 await self._ask(lambda: self.bench.act(command, tab))
         except UserError as error:
             await tab.socket.send_json({"refused": str(error)})
+
+    async def _tune(self, wish: Any, tab: Tab) -> None:
+        try:
+            await self.loop.run_in_executor(None, self.bench.tuning.ask, wish)
+        except UserError as error:
+            with contextlib.suppress(ConnectionError):
+                await tab.socket.send_json({"refused": str(error)})
 
     def _set_pace(self, pace: Any) -> None:
         if pace not in PACES or isinstance(pace, bool):

@@ -25,6 +25,7 @@ from .record import Records
 from .recording import BUTTONS, POT, Origin, Recording
 from .scope import Scope
 from .symbols import Symbols
+from .tuning import FIXED, Tuning
 
 SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm", "fw.profile_a", "plant.torque_mean_nm"]
 FIRST_S = 0.01
@@ -39,7 +40,7 @@ SUPPLY, TEMPERATURE = "supply.voltage_v", "motor.temp_c"
 class VirtualBoard:
     """Between two run() it can be worked at; one thread at a time."""
 
-    def __init__(self, library: Library, origin: Origin, symbols: Symbols | None = None) -> None:
+    def __init__(self, library: Library, origin: Origin, symbols: Symbols | None = None, tuning: Tuning | None = None) -> None:
         self.library, self.origin = library, origin
         self.line = Line()
         self.scope: Scope | None = None
@@ -47,6 +48,7 @@ class VirtualBoard:
         self.symbols = symbols
         self.records = None if library.params["SCOPE"] else Records(library.params, library.states)
         self.kept = Kept.of(symbols) if self.records is None else None # it needs the scope's link
+        self.tuning = tuning if self.records is None else None
         scenario = Scenario("live", "", "", "", "", 0.0, defines=origin.defines)
         self.job = simulate.prepare(scenario, library, origin.motor, origin.board)
         self.rated = motor_file.load(str(origin.motor.path))
@@ -76,8 +78,17 @@ class VirtualBoard:
         """The scope's thread, where the firmware has a scope; it talks over the serial line while the board runs."""
         self.publish = publish
         if self.symbols is not None and self.records is None:
-            self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish, self.kept.beat if self.kept else lambda link: None)
+            self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish, self._beat)
             self.scope.start()
+
+        if self.tuning is not None:
+            self.tuning.publish = publish
+
+    def _beat(self, link: Lnet) -> None:
+        """What else the scope's thread does."""
+        for part in (self.kept, self.tuning):
+            if part is not None:
+                part.beat(link)
 
     def paced(self, pace: float) -> None:
         """So much slower everything is answered, too."""
@@ -85,9 +96,10 @@ class VirtualBoard:
             self.scope.answer_s = ANSWER_S / pace
 
     def end(self) -> None:
-        """The thread ends."""
-        if self.scope is not None:
-            self.scope.end()
+        """The threads end."""
+        for part in (self.scope, self.tuning):
+            if part is not None:
+                part.end()
 
     # ---- power, time -----------------------------------------------------------------------------------------------------
     def power_up(self) -> None:
@@ -288,13 +300,14 @@ class VirtualBoard:
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(True), "kept": self.kept is not None, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None,
+                "panels": view.panels(True), "kept": self.kept is not None, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None,
                 "recorder": self.records and self.records.hello(self.symbols or Symbols({}))}
 
     def frame(self) -> dict[str, Any]:
         """What has happened since the last frame, and how things stand."""
-        while self.kept is not None and self.kept.news:
-            self.note(self.kept.news.popleft(), kind="action")
+        for part in (self.kept, self.tuning):
+            while part is not None and part.news:
+                self.note(part.news.popleft(), kind="action")
         told, self.told = self.told, self.lines
         new, self.new_strip = self.new_strip, []
         self.strip.extend(new)
@@ -315,6 +328,12 @@ class VirtualBoard:
     def scenario(self) -> str:
         """What was done since power-up, as a scenario."""
         return self.recording.toml(self.time_s)
+
+    def header(self) -> str:
+        """userparams.h with what has been changed."""
+        if self.tuning is None:
+            raise UserError("no parameter can change", "page", FIXED)
+        return self.tuning.saved()
 
     def csv(self) -> str:
         """The trace since power-up, at most that of the last two minutes."""

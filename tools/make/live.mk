@@ -1,7 +1,7 @@
 # The virtual board in real time: make live, the page; make live-board, its serial line. Variables: MOTOR BOARD DEFINES USERPARAMS as for
 # `make run`; PORT ELF (a real board); CPU=33f (the simulated chip, with XC16=folder or IMAGE=file).
 tuned = $(if $(USERPARAMS),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,:))
-.PHONY: live live-pictures live-board live-library setup-live setup-scope
+.PHONY: live live-pictures live-board live-library live-params setup-live setup-scope
 live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= PORT=/dev/ttyUSB0 ELF= KEPT=file]
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
@@ -12,6 +12,18 @@ live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make
 
 live-library:
 	$(call build,$(addprefix $B/,libvboard.so foc33.elf))
+
+# For tools/live/tuning.py: the parameters of this userparams.h, and what else of the firmware it decides.
+live-params:
+	$(call build,$(addprefix $B/,tuned.o rest.i))
+
+$B/tuned.o: tools/live/tuned.c $B/flags | $B/params
+	$(call say,cc,$<)$(compile) -MMD -MP -c $< -o $@
+
+$B/rest.i: $B/unit.c $B/flags | $B/params
+	$(call say,cpp,$<)$(compile) -w -MMD -MP -MF $(@:.i=.d) -MT $@ -E -P -DDRIVE_PARAM_INIT_H '-DDRIVE_PARAMS_INIT={0}' $< -o $@
+
+-include $B/tuned.d $B/rest.d
 
 live-board: setup-scope ## [run] the virtual board in real time, its serial line with the scope a pseudo-terminal [MOTOR= BOARD= DEFINES= APP=name USERPARAMS= CPU=33f IMAGE=file KEPT=file]
 	@$(if $(CPU),$(if $(filter 33f host,$(CPU)),,echo foc33: no processor $(call quoted,CPU=$(CPU)): use 33f or host >&2; exit 2))
