@@ -39,8 +39,9 @@
 #define SPEED_TRIM_SHIFT 8          /* [shift] the trim takes 1/256 of the error in half of its steps, 16 periods apart: 2.4 rad/s at 20 kHz | lowspeed */
 #define SPEED_TRIM_LEAK_SHIFT 7     /* [shift] and is forgotten in a tenth of a second | loadsteps */
 #define SPEED_TRIM_MOST_SHIFT 3     /* [shift] an eighth of the largest current at most | lowspeed */
-#define SPEED_TRIM_ERROR_SHIFT 4    /* [shift] an error beyond a sixteenth of the speed is no rest | loadsteps */
-#define SPEED_SWING_STEPS 150u      /* [steps] of 16 periods, 0.12 s at 20 kHz, that a swing beyond it to either side is remembered | pulse */
+#define SPEED_TRIM_ERROR_SHIFT 3    /* [shift] an error beyond an eighth of the speed is no rest | loadsteps */
+#define SPEED_SWING_SHIFT 4         /* [shift] one beyond a sixteenth is a swing | pulse */
+#define SPEED_SWING_STEPS 150u      /* [steps] of 16 periods, 0.12 s at 20 kHz, that a swing to either side is remembered | pulse */
 
 /* ---- Field weakening and d current ---- */
 #define FIELDWEAK_TRIM_STEP 4       /* [Q13 A] d current that the voltage feedback gives back every 16 periods | run SCENARIO=demo */

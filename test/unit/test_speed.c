@@ -275,7 +275,7 @@ void test_trim_is_forgotten_while_the_speed_is_not_at_rest(void)
         int16_t v_q_q14;
     } cases[] = {
         { "at the voltage limit", 10000, 9990, 0, 0, 20000 },
-        { "reference moves", 9992, 9990, 0, 0, 0 },         { "far behind", 10000, 9374, 0, 0, 0 }, { "far ahead", 10000, 10626, 0, 0, 0 },
+        { "reference moves", 9992, 9990, 0, 0, 0 },         { "far behind", 10000, 8749, 0, 0, 0 }, { "far ahead", 10000, 11251, 0, 0, 0 },
         { "after a large innovation", 10000, 9990, 0, 32767, 0 }, { "at the current limit", 10000, 9990, 5120, 0, 0 }, { "while braking at it", 10000, 9990, -5120, 0, 0 },
     };
     EACH(n, cases) {
