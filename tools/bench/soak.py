@@ -37,8 +37,8 @@ SHARES = (0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 """Of the rated torque: the largest that motor and supply can hold is drawn from."""
 SAGS, WARM_R, WARM_PSI, TRUE_L = (0.87, 1.0), (0.7, 1.4), (0.8, 1.2), (0.75, 1.25)
 """What the supply may sag to, and what the true motor may be of its header's: a wrong header, and temperature."""
-HOLD_S, HOLD_TORQUES, HOLD_SPEED = (0.01, 0.1), (1.3, 3.0), 0.1
-"""How long a hand holds the shaft, and how hard: times the most torque that the drive has; from which share of the rated speed on (make held)."""
+HOLD_S, HOLD_TORQUES = (0.01, 0.1), (1.3, 3.0)
+"""How long a hand holds the shaft, and how hard: times the most torque that the drive has."""
 MIDDLE = 0.05
 """Of the potentiometer's travel on each side: where the middle chooses no direction, and no speed."""
 VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
@@ -296,10 +296,7 @@ class _Drawing:
         self._rest(0.0)
 
     def _held(self) -> None:
-        """A hand on the shaft, harder than the drive, and off again. Below a tenth of the rated speed such a hold may end in a fault."""
-        if abs(self.rpm) < HOLD_SPEED * self.motor.rated_speed_rpm:
-            self._rest(0.0)
-            return
+        """A hand on the shaft, harder than the drive, and off again."""
         most_nm = param(self.params, "MAXIMUM_CURRENT_A") * reach.torque_per_amp(self.plant)
         self._set({BRAKE: self.load_nm + self.r.uniform(*HOLD_TORQUES) * most_nm}, 0.002)
         self.now_s += self.r.uniform(*HOLD_S)
