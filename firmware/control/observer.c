@@ -42,7 +42,7 @@ INLINE q15_t observer_twice(q15_t share)
 
 #define OBSERVER_FASTEST 32700
 
-INLINE int32_t observer_sum(int32_t omega_q16, int32_t change)
+int32_t observer_sum(int32_t omega_q16, int32_t change)
 {
     const int32_t fastest_q16 = (int32_t)OBSERVER_FASTEST * 65536;
     if (change >= 0) {

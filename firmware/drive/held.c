@@ -255,7 +255,7 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     }
     shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
-    if (shaft->doubts >= (speed_swings(&d->run) ? HELD_DOUBTS_SWINGS : HELD_DOUBTS_MOST)) {
+    if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
         held_will(shaft, HELD_STOP);
     }
 }

@@ -24,7 +24,7 @@ INLINE uint16_t limits_brakes(current_q13_t iq_q13, int16_t turns)
 }
 
 /** 1 while the q current brakes and the bus leaves less of it than the circle. With no braking current at all its reference is 0, which has no sign. */
-QM_INLINE uint16_t limits_bus_is_narrower(const drive_control_t *c, speed_erpm_t speed)
+static uint16_t limits_bus_is_narrower(const drive_control_t *c, speed_erpm_t speed)
 {
     return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && (c->ref_q13.q == 0 || limits_brakes(c->ref_q13.q, speed)));
 }

@@ -123,7 +123,9 @@ static void choose_state(drive_t *d, const drive_params_t *p, const drive_sample
     speed_choose_state(d, p);
 }
 
-/** The speed's error at rest; stall and lost lock. While the innovation gate is open the gains follow here, too. */
+/* wcet: speed_load_moves_against excludes trim_speed/speed_follow */
+/** The speed's error at rest; stall and lost lock. While the innovation gate is open the gains follow here, too; the trim looks at the
+ *  load's way only while it is closed, and nothing moves it in between. */
 static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     speed_trim_step(d, p);

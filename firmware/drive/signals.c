@@ -66,7 +66,7 @@ static void signals_gather_beats(signals_evidence_t *e, const drive_t *d, int16_
 {
     const sincos_t at = d->frame;
     sincos_t double_angle;
-    if (qm_abs(observer_speed(&d->run.observer)) < (qm_abs(d->run.control.reference_erpm) >> SIGNALS_STANDS_SHIFT)) {
+    if (qm_beyond(d->run.control.reference_erpm >> SIGNALS_STANDS_SHIFT, qm_abs(observer_speed(&d->run.observer)))) {
         return;
     }
     double_angle.cos = (int16_t)(qm_mulhi(at.cos, at.cos) - qm_mulhi(at.sin, at.sin)); /* half */
@@ -95,8 +95,8 @@ static uint32_t signals_beat(const signals_beat_t *sum)
 /** 1 where only a wrong signal can be behind it. */
 static uint16_t signals_prove(const signals_evidence_t *e, const drive_params_t *p)
 {
-    const uint32_t once = signals_beat(&e->once), twice = signals_beat(&e->twice), least = e->size / 2u + e->size / 8u;
-    return (uint16_t)(once > least || twice > least || e->size > qm_muluu(e->checks, p->load_erpm) || e->unexplained > e->checks / 2u);
+    const uint32_t least = e->size / 2u + e->size / 8u;
+    return (uint16_t)(signals_beat(&e->once) > least || signals_beat(&e->twice) > least || e->size > qm_muluu(e->checks, p->load_erpm) || e->unexplained > e->checks / 2u);
 }
 
 /** Begins anew; member by member, for the longest path knows of no loop over bytes. */

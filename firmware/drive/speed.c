@@ -83,10 +83,10 @@ uint16_t speed_swings(const drive_run_t *run)
     return (uint16_t)(run->control.swing_steps > 2u * SPEED_SWING_STEPS);
 }
 
-/** Takes a step of the trim into the memory of swings. @param least what counts as one */
-static void speed_remember_swing(drive_control_t *c, int16_t error, int16_t least)
+/** Takes a step of the trim into the memory of swings. @param swings 1: the error is as large as a swing's */
+static void speed_remember_swing(drive_control_t *c, int16_t error, uint16_t swings)
 {
-    if (qm_abs(error) > least && (error ^ c->swung_erpm) < 0) {
+    if (swings && (error ^ c->swung_erpm) < 0) {
         c->swung_erpm = error;
         c->swing_steps = (uint16_t)((c->swing_steps < 3u * SPEED_SWING_STEPS) ? c->swing_steps + SPEED_SWING_STEPS : c->swing_steps);
     } else if (c->swing_steps != 0u) {
@@ -115,10 +115,10 @@ void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_e
     const uint16_t swings = speed_swings(run);
     const int16_t error = qm_sub_limited(c->reference_erpm, swings ? estimator_speed(&run->estimator) : observer_speed(&run->observer));
     const int16_t most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
-    const uint16_t far = (uint16_t)(qm_abs(error) > (qm_abs(before_erpm) >> SPEED_TRIM_ERROR_SHIFT));
+    const int16_t before = qm_abs(before_erpm);
     int32_t trim_q26 = c->iq_trim_q26;
-    speed_remember_swing(c, error, qm_abs(before_erpm) >> SPEED_SWING_SHIFT);
-    if (c->reference_erpm != before_erpm || (!swings && (far || !speed_is_calm(run, iq_q13)))) {
+    speed_remember_swing(c, error, qm_beyond(error, before >> SPEED_SWING_SHIFT));
+    if (c->reference_erpm != before_erpm || (!swings && (qm_beyond(error, before >> SPEED_TRIM_ERROR_SHIFT) || !speed_is_calm(run, iq_q13)))) {
         trim_q26 -= trim_q26 >> SPEED_TRIM_LEAK_SHIFT;
     } else if (swings || !speed_load_moves_against(run, error)) {
         trim_q26 += (qm_mulss(error, swings ? p->speed_kp_q13 : c->speed_kp_q13) + SPEED_TRIM_HALF) >> SPEED_TRIM_SHIFT;
