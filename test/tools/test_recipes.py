@@ -116,7 +116,7 @@ def add_slot(tree: Tree) -> None:
     tree.change("include/drive/schedule.h", r"SLOT\( 6, (\w+, +\w+, +)\w+, +\w+\)", r"SLOT( 6, \1watch_belt, CLOSED)")
     work = ("/** Does the belt slip? */\nstatic void watch_belt(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)\n"
             "{\n    choose_state(d, p, raw);\n}\n\n")
-    tree.change("firmware/drive/schedule.c", r"(?=^/\*\* [^\n]*\*/\nstatic void trim_speed)", work)
+    tree.change("firmware/drive/schedule.c", r"(?=^/\*\* [^\n]*\*/\nstatic void follow_estimate)", work)
     tree.compile()
     page = tree.page("law")
     assert re.search(r"\| 6 \| 0\.6 \| `\w+` \| \w+ \| `watch_belt` \| CLOSED \|", page)

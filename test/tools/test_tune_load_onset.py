@@ -57,10 +57,11 @@ def test_what_is_asked_for_is_the_rated_torque_as_far_as_the_current_allows():
     assert load_onset.asked_nm(weak) == pytest.approx(0.85 * 2.75 * d.motor.kt_nm_per_a)
 
 
-def test_the_virtual_board_holds_the_speed_that_the_model_names_and_not_two_thirds_of_it():
+def test_the_virtual_board_holds_the_speed_that_the_model_names_and_not_those_below_it():
     table = replace(lowspeed.Table.read(paths.TABLES / "lowspeed.toml"), measure_s=2.0)
     bench = lowspeed.LowSpeed(table, motor_file.part(HURST), board_file.part("mclv"), Library(library(["PARAMS_IN_RAM"])), quiet=True)
     minimum = replace(of(HURST).choices["MINIMUM_SPEED_RPM"], text="60")
     named = load_onset.lowest_rpm(replace(of(HURST), choices=of(HURST).choices | {"MINIMUM_SPEED_RPM": minimum}), TORQUE_NM)
-    rows = bench.run([(named, TORQUE_NM), (named / 1.5, TORQUE_NM)], "low")
-    assert rows[0]["verdict"] == "ok" and rows[1]["verdict"] != "ok", (named, rows)
+    below = [share * named for share in (0.55, 0.6, 0.67, 0.75, 0.87)]
+    verdicts = [row["verdict"] for row in bench.run([(speed, TORQUE_NM) for speed in (named, *below)], "low")]
+    assert verdicts[0] == "ok" and verdicts[1:].count("ok") <= 1, (named, verdicts)  # a load that comes at a happy moment is held now and then
