@@ -22,6 +22,14 @@ def chromium(tmp_path_factory, pytestconfig):
     driver.quit()
 
 
+@pytest.fixture(scope="module")
+def server():
+    """make live with the default firmware."""
+    from live_support import served # builds the firmware
+    with served() as running:
+        yield running
+
+
 class Page:
     """What a user sees and does. A page that is open stays open: to draw it costs more than what the tests do with it."""
 

@@ -110,11 +110,11 @@ def test_the_page_of_make_live_knows_the_image_s_parameters_by_name_and_value(pa
     host = Symbols.read(live_board.parts(defines=DEFINES).symbols)
     tuning = Tuning.of(paths.ROOT / "userparams.h", [*DEFINES.replace("-D", "").split(), live_board.SCOPE], host, Symbols.read(parts.symbols))
     try:
-        members = tuning._members(tuning.built)
+        members = tuning.members(tuning.built)
         with contextlib.closing(live_board.LiveBoard(parts)) as live:
             live.run(0.2)
             live.board.uart_take()
-            there = tuning._read_back(lnet.connect(live_board.BoardStream(live)), list(members))
+            there = tuning.read_back(lnet.connect(live_board.BoardStream(live)), list(members))
     finally:
         tuning.end()
     assert len(members) > 150 and {name: value for name, value in zip(members, there) if members[name] != value} == {}

@@ -19,12 +19,6 @@ PLACES = f"""[...document.querySelectorAll("{CONTROLS}")].filter((e) => e.getCli
 STYLE = (page_text.HERE / "page.css").read_text(encoding="utf-8")
 
 
-@pytest.fixture(scope="module")
-def server():
-    with served() as running:
-        yield running
-
-
 @pytest.fixture
 def page(chromium, server) -> Page:
     """The page in its usual size, light, with no fault thrown in."""

@@ -15,12 +15,6 @@ HOME, END, ARROW_DOWN = "\ue011", "\ue010", "\ue015"
 SIZES = [SIZE, (1000, 700)]
 
 
-@pytest.fixture(scope="module")
-def server():
-    with served() as running:
-        yield running
-
-
 @pytest.fixture
 def page(chromium, server) -> Page:
     """The page as it is opened, the board just powered up, whole and without load, the potentiometer at its left end."""

@@ -17,12 +17,6 @@ STEP_S = 1e-4
 TIMES = np.arange(-25, 75) * STEP_S
 
 
-@pytest.fixture(scope="module")
-def server():
-    with served() as running:
-        yield running
-
-
 @pytest.fixture
 def page(chromium, server) -> Page:
     """The page as it is when it is opened, without a trace; its scope stands still."""

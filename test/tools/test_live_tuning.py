@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import functools
+import shutil
 from pathlib import Path
 
 import pytest
@@ -104,7 +105,7 @@ def test_what_is_written_is_what_a_build_with_these_values_has(bench, tmp_path):
     built = board.parts(defines=KEPT_DEFINES, userparams=str(header_with(tmp_path, **values))).library
     assert bench.memory() == bytes_of(built) != before
     assert bench.tuning.told() == {"changed": {name: {"text": text, "place": BOARD} for name, text in values.items()}, "undo": 3, "lost": False, "foreign": 0}
-    assert texts_of(bench.tuning.saved()) == texts_of(HEADER.read_text(encoding="utf-8")) | values
+    assert texts_of(bench.tuning.saved().decode()) == texts_of(HEADER.read_text(encoding="utf-8")) | values
     for name, text in values.items():
         bench.logs(f"{name} {text}")
 
@@ -119,7 +120,7 @@ def test_undo_brings_the_last_value_back_one_by_one(bench):
         bench.tuning.ask("undo")
         bench.written()
         assert bench.memory() == wanted
-    assert bench.tuning.told()["changed"] == {} and bench.tuning.saved() == HEADER.read_text(encoding="utf-8")
+    assert bench.tuning.told()["changed"] == {} and bench.tuning.saved() == HEADER.read_bytes()
     refusal(lambda: bench.tuning.ask("undo"), "nothing to undo")
 
 
@@ -128,6 +129,32 @@ def test_a_value_that_is_the_header_s_again_is_no_change(bench):
     assert list(bench.tuning.told()["changed"]) == ["INVKFI_SPEED3"]
     bench.change("INVKFI_SPEED3", "NORM_INVKFIBASE")
     assert bench.tuning.told()["changed"] == {} and bench.tuning.wanted == {}
+
+
+def test_a_header_whose_comments_are_not_utf_8_or_whose_lines_end_as_a_windows_editor_ends_them_is_saved_as_it_is(tmp_path):
+    content = HEADER.read_bytes().replace(b"\n", b"\r\n", 20) + b"/* 25 \xb0C, \xb5s */\n"
+    (tmp_path / HEADER.name).write_bytes(content)
+    tuning = Tuning.of(tmp_path / HEADER.name, DEFINES, symbols(), symbols())
+    with contextlib.ExitStack() as stack:
+        stack.callback(tuning.end)
+        assert tuning.saved() == content
+        tuning.ask(["SPEED_BANDWIDTH_HZ", "9.5"])
+        changed = [(old, new) for old, new in zip(content.splitlines(True), tuning.saved().splitlines(True), strict=True) if old != new]
+        assert tuning.wanted and len(changed) == 1 and changed[0][1].split()[:3] == [b"#define", b"SPEED_BANDWIDTH_HZ", b"9.5"]
+
+
+def test_a_folder_that_somebody_has_cleaned_is_made_again_and_one_that_cannot_be_written_is_told(bench, tmp_path):
+    folder = bench.tuning.compiler.folder
+    shutil.rmtree(folder)
+    bench.change("SPEED_BANDWIDTH_HZ", "9.25")
+    (tmp_path / "file").write_text("")
+    before = bench.tuning.told()
+    bench.tuning.compiler.folder = tmp_path / "file" / "folder"
+    try:
+        refusal(lambda: bench.tuning.ask(["SPEED_BANDWIDTH_HZ", "9.125"]), "Not a directory", str(tmp_path / "file" / "folder"), "nothing has changed")
+    finally:
+        bench.tuning.compiler.folder = folder
+    assert bench.tuning.told() == before
 
 
 def test_a_turning_motor_follows_the_changed_ramp(bench):
@@ -169,7 +196,7 @@ def test_what_a_running_board_cannot_have_goes_into_the_saved_header_alone(bench
     before = bench.memory()
     bench.change(name, text)
     assert bench.memory() == before and bench.tuning.told()["changed"] == {name: {"text": text, "place": place}}
-    assert texts_of(bench.tuning.saved())[name] == text
+    assert texts_of(bench.tuning.saved().decode())[name] == text
     bench.logs(f"{name} {text}: {said}")
 
 
@@ -219,7 +246,7 @@ def test_values_of_the_board_that_are_not_the_header_s_are_counted(tmp_path):
         stack.callback(tuning.end)
         tuning.ask(["DERATE_BELOW_V", "16"])
         tuning.beat(wire)
-        differs = sum(value != tuning._members(own.built)[name] for name, value in tuning._members(tuning.built).items())
+        differs = sum(value != tuning.members(own.built)[name] for name, value in tuning.members(tuning.built).items())
         assert tuning.told()["foreign"] == differs >= 2 and wire.written > 0
 
 

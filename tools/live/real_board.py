@@ -247,7 +247,7 @@ class RealBoard:
         """Only a virtual board can repeat."""
         raise UserError("a real board has no scenario", "page", "save its CSV")
 
-    def header(self) -> str:
+    def header(self) -> bytes:
         """userparams.h with what has been changed."""
         if self.tuning is None:
             raise UserError("no parameter can change", "page", FIXED)

@@ -179,10 +179,11 @@ class Server:
             raise web.HTTPNotFound(text="foc33: nothing to save by this name\n")
         name, kind = SAVED[what]
         try:
-            text = await self._ask(getattr(self.bench, what))
+            saved = await self._ask(getattr(self.bench, what))
         except UserError as error:
             return web.Response(status=409, text=f"foc33: {error}\n")
-        return web.Response(text=text, content_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+        body = saved if isinstance(saved, bytes) else saved.encode("utf-8")
+        return web.Response(body=body, content_type=kind, charset="utf-8", headers={"Content-Disposition": f'attachment; filename="{name}"'})
 
 
 def _command(text: str) -> Any:

@@ -3,6 +3,7 @@
 A change is compiled as a build would compile it: a build's checks refuse what cannot work, and what differs in board_params is written to the board. What the
 rest of the firmware knows as a constant, or what scales the page's numbers, needs a build: it goes into the saved header alone."""
 
+import contextlib
 import re
 import shutil
 import tempfile
@@ -10,9 +11,10 @@ import threading
 import time
 import zlib
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +28,6 @@ from .lnet import Lnet
 from .symbols import Symbols
 
 try:
-    from io import BytesIO
-
     from elftools.elf.elffile import ELFFile
 except ImportError:
     pass # program.reading() says so
@@ -59,8 +59,9 @@ class Compiler:
         self.text, self.defines = text, defines
         self.known: dict[frozenset[tuple[str, str]], Built] = {}
         base = paths.ROOT / "build" / "live"
-        base.mkdir(parents=True, exist_ok=True)
-        self.folder = Path(tempfile.mkdtemp(prefix="tuned-", dir=base))
+        with _written(base):
+            base.mkdir(parents=True, exist_ok=True)
+            self.folder = Path(tempfile.mkdtemp(prefix="tuned-", dir=base))
         self.results = paths.ROOT / "build" / f"host-{build.variant_name(defines, self.folder)}"
 
     def close(self) -> None:
@@ -76,13 +77,29 @@ class Compiler:
         return self.known[key]
 
     def _build(self, values: dict[str, str]) -> Built:
-        (self.folder / build.HEADER).write_text(with_values(self.text, values), encoding="utf-8")
+        with _written(self.folder):
+            self.folder.mkdir(parents=True, exist_ok=True) # somebody may have cleaned up
+            (self.folder / build.HEADER).write_bytes(_bytes(with_values(self.text, values)))
         result = build.make("live-params", self.defines, self.folder)
         if result.returncode != 0:
             said = REFUSED.search(result.stderr)
             raise UserError(said[1] if said else "the firmware does not build with it", "parameters", "nothing has changed")
         found = _objects(self.results / "tuned.o", ("tuned_params", "tuned_scales"))
         return Built(found["tuned_params"], found["tuned_scales"], zlib.crc32((self.results / "rest.i").read_bytes()))
+
+
+def _bytes(text: str) -> bytes:
+    """A header's text as its file has it, whatever its comments are written in."""
+    return text.encode("utf-8", "surrogateescape")
+
+
+@contextlib.contextmanager
+def _written(folder: Path) -> Iterator[None]:
+    """A disk that is full or may not be written is told in one line."""
+    try:
+        yield
+    except OSError as error:
+        raise UserError(f"{error.strerror}, {folder}", "parameters", "make room there; nothing has changed") from None
 
 
 def _objects(path: Path, names: tuple[str, ...]) -> dict[str, bytes]:
@@ -103,7 +120,7 @@ class Tuning:
     `layout`: symbols of the PC's firmware with the same header and modes; `symbols`: those of the board's firmware."""
 
     def __init__(self, header: Path, defines: list[str], layout: Symbols, symbols: Symbols) -> None:
-        self.header = header.read_text(encoding="utf-8")
+        self.header = header.read_bytes().decode("utf-8", "surrogateescape")
         self.defines, self.layout, self.symbols = defines, layout, symbols
         self.publish: Callable[[dict[str, Any]], None] = lambda message: None
         self.lock = threading.Lock()
@@ -128,6 +145,7 @@ class Tuning:
 
     @cached_property
     def compiler(self) -> Compiler:
+        """Starts with the first change, ends with end()."""
         return Compiler(self.header, self.defines)
 
     @cached_property
@@ -204,14 +222,14 @@ class Tuning:
 
     def _want(self, built: Built) -> None:
         """Members that differ from what the board has."""
-        new = {name: value for name, value in self._members(built).items() if value != self._members(self.built)[name]}
-        changes = {name: new.get(name, self._members(self.built)[name]) for name in self.wanted | new if self.wanted.get(name) != new.get(name)}
+        new = {name: value for name, value in self.members(built).items() if value != self.members(self.built)[name]}
+        changes = {name: new.get(name, self.members(self.built)[name]) for name in self.wanted | new if self.wanted.get(name) != new.get(name)}
         self.wanted = new
         if changes:
             self.todo.append(changes)
 
-    def _members(self, built: Built) -> dict[str, int]:
-        """Numbers of board_params by name."""
+    def members(self, built: Built) -> dict[str, int]:
+        """Numbers of board_params by name, as the firmware's variables have them."""
         items = {name: item for name, item in self.layout.variables.items() if name.startswith(f"{BASE}.")}
         first = min(item.address for item in items.values())
         return {name: item.value(built.params[item.address - first:]) for name, item in items.items()}
@@ -220,8 +238,8 @@ class Tuning:
     def beat(self, link: Lnet) -> None:
         """Writes what is to be written; looks whether the board still has it."""
         if self.todo and self.foreign is None:
-            header = self._members(self.built)
-            self.foreign = sum(value != there for value, there in zip(header.values(), self._read_back(link, list(header))))
+            header = self.members(self.built)
+            self.foreign = sum(value != there for value, there in zip(header.values(), self.read_back(link, list(header))))
             self.publish({"tuning": self.told()})
         while self.todo:
             for name, value in self.todo[0].items():
@@ -236,13 +254,14 @@ class Tuning:
 
     def _look(self, link: Lnet) -> None:
         wanted = dict(self.wanted)
-        lost = bool(wanted) and self._read_back(link, list(wanted)) != list(wanted.values())
+        lost = bool(wanted) and self.read_back(link, list(wanted)) != list(wanted.values())
         if lost != self.lost and not self.todo:
             self.lost = lost
             self.news.append("the board has lost the changed parameters" if lost else "the board has the changed parameters")
             self.publish({"tuning": self.told()})
 
-    def _read_back(self, link: Lnet, names: list[str]) -> list[int]:
+    def read_back(self, link: Lnet, names: list[str]) -> list[int]:
+        """What the board has in these members; for the link's thread."""
         items = [self.symbols.find(name) for name in names]
         first = min(item.address for item in items)
         memory = link.read(first, max(item.address + item.bytes for item in items) - first)
@@ -262,6 +281,6 @@ class Tuning:
         return {"changed": {name: {"text": text, "place": place} for name, (text, place) in self.changed.items()}, "undo": len(self.before),
                 "lost": self.lost, "foreign": self.foreign or 0}
 
-    def saved(self) -> str:
-        """The header with the changed values."""
-        return with_values(self.header, {name: text for name, (text, _) in self.changed.items()})
+    def saved(self) -> bytes:
+        """The header with the changed values, else to the last byte as its file is."""
+        return _bytes(with_values(self.header, {name: text for name, (text, _) in self.changed.items()}))

@@ -329,7 +329,7 @@ class VirtualBoard:
         """What was done since power-up, as a scenario."""
         return self.recording.toml(self.time_s)
 
-    def header(self) -> str:
+    def header(self) -> bytes:
         """userparams.h with what has been changed."""
         if self.tuning is None:
             raise UserError("no parameter can change", "page", FIXED)
