@@ -115,7 +115,7 @@ void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_e
     const uint16_t swings = speed_swings(run);
     const int16_t error = qm_sub_limited(c->reference_erpm, swings ? estimator_speed(&run->estimator) : observer_speed(&run->observer));
     const int16_t most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
-    const int16_t before = qm_abs(before_erpm);
+    int16_t before = qm_abs(before_erpm);
     int32_t trim_q26 = c->iq_trim_q26;
     speed_remember_swing(c, error, qm_beyond(error, before >> SPEED_SWING_SHIFT));
     if (c->reference_erpm != before_erpm || (!swings && (qm_beyond(error, before >> SPEED_TRIM_ERROR_SHIFT) || !speed_is_calm(run, iq_q13)))) {

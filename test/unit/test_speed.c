@@ -238,10 +238,11 @@ void test_swings_are_forgotten_in_an_eighth_of_a_second_and_not_remembered_for_l
     uint16_t steps = 0;
     rig_closed(1, 10000);
     (void)trim_of_swings(100, 10, 9000, 11000);
-    while (speed_swings(&drive.run)) {
+    while (speed_swings(&drive.run) && steps < 2u * SPEED_SWING_STEPS) {
         (void)trim_after(1, 10000);
         steps++;
     }
+    TEST_ASSERT_EQUAL_UINT16(2u * SPEED_SWING_STEPS, drive.run.control.swing_steps);
     TEST_ASSERT_UINT16_WITHIN(15, SPEED_SWING_STEPS, steps);
     (void)trim_after(4u * SPEED_SWING_STEPS, 10000);
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.control.swing_steps);
