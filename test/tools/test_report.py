@@ -74,3 +74,14 @@ def test_hand_over_field_weakening_and_arrays_get_their_own_plots(tmp_path, sign
     item.variables = variables
     assert set(plots.write_all(item, tmp_path)) == {path.name for path in tmp_path.iterdir()} == names
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in tmp_path.iterdir())
+
+
+def test_the_speed_plot_says_what_happened_where_it_happened(tmp_path, monkeypatch):
+    events = "".join(f'[[event]]\nat_s = {at_s}\nset = {{ "load.constant_nm" = 0.01 }}\nnote = "{note}"\n' for at_s, note in ((0.5, "a brake"), (0.52, "and more of it"), (1.5, "again")))
+    item, drawn = run(TEXT + events, fw__state=4, plant__speed_rpm=1001), {}
+    monkeypatch.setattr(plots, "saved", lambda figure, folder, name: drawn.setdefault(name, figure) and name)
+    plots.write_all(item, tmp_path)
+    axes = drawn["speed"].axes[0]
+    assert [(text.get_text().strip(), text.get_position()[0], text.get_ha()) for text in axes.texts] == [
+        ("a brake", 0.5, "right"), ("and more of it", 0.52, "left"), ("again", 1.5, "right")], "one that is close goes to the other side"
+    assert not drawn["currents"].axes[0].texts

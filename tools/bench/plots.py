@@ -77,10 +77,22 @@ def _speed(run: Run, thin: Trace, axes: plt.Axes) -> None:
     reference = np.where(_closed(run, thin), thin.column("fw.speed_ref_rpm"), np.nan)
     axes.plot(thin.time_s, estimated, label="estimated", color="tab:orange", linestyle="--")
     axes.plot(thin.time_s, reference, label="reference", color="black", linewidth=0.7)
-    for item in run.hand_overs():
-        axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":",
-                     label=item.text)
+    for number, item in enumerate(run.hand_overs()):
+        axes.axvline(item.at_s, color="tab:green", linewidth=0.8, linestyle=":", label="" if number else item.text)
+    _notes(run, axes)
     _finish(axes, f"{run.scenario.name}: speed", "speed [rpm]")
+
+
+def _notes(run: Run, axes: plt.Axes) -> None:
+    """What the scenario says of its events, where they happen: left of a line, and right of it where the left is taken."""
+    room_s, last_s = run.scenario.duration_s / 50.0, -1e9
+    for event in run.scenario.events:
+        if event.note:
+            is_left = event.at_s - last_s > room_s
+            axes.axvline(event.at_s, color="grey", linewidth=0.5)
+            axes.text(event.at_s, 0.01, f" {event.note}", rotation=90, ha="right" if is_left else "left", va="bottom", fontsize=7, color="dimgrey",
+                      transform=axes.get_xaxis_transform(), zorder=1.0)
+            last_s = event.at_s
 
 
 def _true_speed(run: Run, thin: Trace, axes: plt.Axes) -> None:

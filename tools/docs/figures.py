@@ -14,6 +14,9 @@ from tools.image import size
 
 ROOT = paths.ROOT
 
+APPLICATIONS = sorted(path.stem for path in (ROOT / "firmware" / "app").glob("*.c") if path.stem != "panel")
+"""Those beside the panel, which every other run shows."""
+
 Table = tuple[list[str], list[list[str]]]
 """Head and rows."""
 
@@ -275,6 +278,15 @@ def tests() -> Table:
     return ["check", "result", "command"], rows
 
 
+def applications() -> Table:
+    """What the scenario of each application in firmware/app/ shows."""
+    rows = []
+    for name in APPLICATIONS:
+        run = result(f"app_{name}-app-{name.replace('_', '-')}")
+        rows.append([f"`{name}`", run["title"].split(": ", 1)[1], held(run), f"`make run APP={name}`"])
+    return ["application", "its scenario", "expectations that hold", "command"], rows
+
+
 @dataclass(frozen=True)
 class Part:
     """Rows that are measured together. Without a name: all rows of the block."""
@@ -298,6 +310,7 @@ BLOCKS: dict[str, list[Part]] = {
     "held": [Part(("held",), helds)],
     "pulse": [Part(("pulse",), pulses)],
     "box": [Part(("box",), boxes)],
+    "applications": [Part(("applications",), applications)],
     "tests": [Part(("tests",), tests)],
     "table2": [Part(("table2",), table2)],
     "size": [Part(("size",), lambda: size.readme_table(loaded("target/size.json")))],

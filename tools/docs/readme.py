@@ -23,7 +23,7 @@ from tools.common.checksum import PARTS, checksum, files
 from tools.common.errors import UserError, suggestion
 
 from . import figures
-from .figures import BLOCKS, Part
+from .figures import APPLICATIONS, BLOCKS, Part
 
 ROOT = paths.ROOT
 MOTORS = paths.names(paths.MOTORS)
@@ -65,6 +65,8 @@ SOURCES = {
     "table2_40khz": Source((f"table2 {AT_40KHZ} OUT=build/run/table2_40khz",)),
     "cycles_40khz": Source((f"tune {AT_40KHZ}", f"cycles SCENARIO=demo_40khz USERPARAMS={HEADER_40KHZ} OUT=build/target/40khz"), "chip"),
     **{name: Source((name,), takes="by name", left=f"{name}/seed-1/summary.json") for name in ("campaign", "soak")},
+    "applications": Source(tuple(f"run APP={name}" for name in APPLICATIONS),
+                           pictures=tuple((f"run/app_{name}-app-{name.replace('_', '-')}/speed.png", f"app-{name}.png") for name in APPLICATIONS)),
     "tests": Source(("test", "coverage"), takes="found", left="test/summary.json"),
 }
 
