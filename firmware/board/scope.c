@@ -182,7 +182,8 @@ static uint16_t take_trigger(scope_t *s, const uint8_t *at, uint16_t rows)
                       && word_at(at + TRIGGER_DELAY + 2) == ((delay >= 0x8000u) ? 0xFFFFu : 0u) && take_delay(s, (int16_t)delay, rows));
 }
 
-uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
+/** A request to record. @return 1 if it was understood */
+static uint16_t take_setting(scope_t *s, const uint8_t *request, uint16_t size)
 {
     int16_t mode = (int16_t)request[0];
     uint16_t rows, from, words;
@@ -221,6 +222,16 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
     s->is_rare = (uint16_t)(s->before != 0u || s->looking >= 0);
     s->mode = mode;
     return 1;
+}
+
+uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
+{
+    uint16_t is_good = take_setting(s, request, size);
+    if (!is_good) { /* clients that do not look at the error find nothing to read */
+        scope_init(s);
+        s->last = board_scope_array;
+    }
+    return is_good;
 }
 
 /** Words of any number. @return where the next row goes */
@@ -415,6 +426,9 @@ static uint8_t serve(lnet_t *l, const uint8_t *request, uint16_t size)
     switch (request[AT_SERVICE]) {
     case LNET_DEVICE_INFO:
         l->left = put_info((uint16_t *)(void *)&l->buffer[AT_PAYLOAD]);
+        if (l->scope.words == 0u) { /* the one before it may have been refused */
+            scope_init(&l->scope);
+        }
         is_good = 1;
         break;
     case LNET_GET_RAM:

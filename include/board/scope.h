@@ -60,7 +60,7 @@ extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
 void scope_init(scope_t *s);
 
 /** A request to record, as it stands in a frame: state, channels, periods between rows, channels, trigger. Without channels the scope stops.
- *  @return 1 if it was understood; in any case a running record has ended */
+ *  @return 1 if it was understood; in any case a running record has ended. 0: the array is empty until the next good request, or device info */
 uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size);
 
 /** What the scope has done, as it stands in a frame. @param record at an even address, with room for thirty bytes */

@@ -359,10 +359,17 @@ void test_a_client_stops_the_scope(void)
     TEST_ASSERT_EQUAL_HEX16(0x1111, board_scope_array[0]);
 }
 
+#define USED 22
+#define SIZE 26
+
+/** A client that does not look at the error is ready at once, and there is nothing to read. */
 static void expect_refused(void)
 {
     TEST_ASSERT_EQUAL_UINT8(20, start());
-    TEST_ASSERT_EQUAL_UINT16(SCOPE_IDLE, board_lnet.scope.mode);
+    TEST_ASSERT_EQUAL_UINT16(SCOPE_IDLE, state());
+    TEST_ASSERT_EQUAL_UINT32(0, long_at(USED));
+    TEST_ASSERT_EQUAL_UINT32(0, long_at(SIZE));
+    TEST_ASSERT_EQUAL_UINT32(0, long_at(6)); /* the next row's place is the used bytes' end: ready */
     period(3);
     TEST_ASSERT_EQUAL_HEX16(0x1111, board_scope_array[0]);
 }
@@ -409,6 +416,21 @@ void test_settings_that_the_scope_cannot_have_are_refused(void)
     set_channels(SCOPE_TRIGGERED, 1, 0, 2);
     set_trigger(0x82, 0, 0x10000, 1, 1);
     expect_refused();
+}
+
+void test_after_a_refused_setting_a_good_one_and_a_client_that_connects_see_the_whole_array_again(void)
+{
+    TEST_ASSERT_EQUAL_UINT8(20, record(9, 0));
+    TEST_ASSERT_EQUAL_UINT8(0, record(1, 0));
+    (void)state();
+    TEST_ASSERT_EQUAL_UINT32(2u * SCOPE_ARRAY_WORDS, long_at(SIZE));
+    TEST_ASSERT_EQUAL_UINT8(20, record(9, 0));
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(0));
+    TEST_ASSERT_EQUAL_UINT16(SCOPE_IDLE, state());
+    TEST_ASSERT_EQUAL_UINT32(2u * SCOPE_ARRAY_WORDS, long_at(SIZE));
+    TEST_ASSERT_EQUAL_UINT8(0, record(1, 0));
+    TEST_ASSERT_EQUAL_UINT8(0, rig_ask(0));
+    TEST_ASSERT_EQUAL_UINT16(SCOPE_AUTO, state()); /* a record that runs goes on */
 }
 
 void test_addresses_that_cannot_be_recorded_are_refused(void)
