@@ -35,14 +35,20 @@ def rename(path: Path) -> int:
                 new = NAMES.get(name.value.decode())
                 if new is None or longer is None or die.attributes["DW_AT_byte_size"].value != BYTES: # a unit with int alone has no variable of it
                     continue
-                if longer > 0x7F or die.abbrev_code > 0x7F or name.form == INLINE and len(name.value) != 3:
+                room = die.attributes["DW_AT_byte_size"].offset - die.offset
+                if longer >> 7 * room or name.form == INLINE and len(name.value) != 3:
                     raise UserError("a type cannot be renamed", str(path), "compile with another version of gcc")
-                data[info.global_offset + die.offset] = longer
+                data[info.global_offset + die.offset:info.global_offset + die.offset + room] = leb128(longer, room)
                 at = info.global_offset + name.offset
                 data[at:at + 4] = offsets[new].to_bytes(4, "little")
                 changed += 1
     path.write_bytes(data)
     return changed
+
+
+def leb128(value: int, size: int) -> bytes:
+    """A number of DWARF with a size of its own: more bytes than it needs are as good."""
+    return bytes(value >> 7 * n & 0x7F | (0x80 if n < size - 1 else 0) for n in range(size))
 
 
 def _offset(strings: bytes, text: str) -> int:
