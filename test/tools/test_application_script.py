@@ -1,0 +1,35 @@
+"""tools/make/app.sh: an application is compiled alone, reaches nothing but app.h's, and may have another name tomorrow."""
+
+import subprocess
+
+import pytest
+
+from tools.common import paths
+
+HOOKS = "void app_init(void);\nvoid app_ms(void);\nvoid app_init(void) {}\nvoid app_ms(void) {}\n"
+
+
+def compiled(folder, text: str, name: str = "mine.c"):
+    (folder / name).write_text(text)
+    command = [paths.ROOT / "tools" / "make" / "app.sh", "app.o", name, "shown.c", "nm", "gcc", f"-I{paths.ROOT}/include", "-MMD", "-MP"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_an_application_that_has_another_name_now_does_not_stop_make(tmp_path):
+    (tmp_path / "makefile").write_text("app.o: $(APP)\n\t@echo built from $(APP)\n-include app.d\n")
+    assert compiled(tmp_path, HOOKS).returncode == 0
+    (tmp_path / "mine.c").rename(tmp_path / "other.c")
+    done = subprocess.run(["make", "APP=other.c"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "built from other.c\n", "")
+
+
+@pytest.mark.parametrize("text, says", [
+    ('#include "drive/drive.h"\n' + HOOKS, '#include "drive/drive.h" in shown.c: an application sees app/ alone'),
+    ("#include <math.h>\n" + HOOKS, "#include <math.h> in shown.c: an application sees app/ alone"),
+    (HOOKS.replace("app_ms", "my_ms"), "no app_ms() in shown.c"), (HOOKS.replace("app_init", "start"), "no app_init() in shown.c"),
+    (HOOKS.replace("app_ms(void) {}", "app_ms(void) { extern int board_drive; board_drive = 0; }"), "board_drive in shown.c: an application reaches nothing but"),
+    (HOOKS.replace("app_ms(void) {}", "app_ms(void) { extern void drive_raise(int); drive_raise(1); }"), "drive_raise in shown.c: an application reaches nothing but")])
+def test_an_application_that_reaches_into_the_drive_is_refused_in_one_line_and_leaves_no_object(tmp_path, text, says):
+    done = compiled(tmp_path, text)
+    assert done.returncode == 2 and done.stderr.startswith(f"foc33: {says}") and done.stderr.count("\n") == 1
+    assert not (tmp_path / "app.o").exists()
