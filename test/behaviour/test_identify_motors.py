@@ -6,7 +6,7 @@ from support import MOTORS
 
 from tools.bench import build
 from tools.common import board_keys, motor_file, paths, workers
-from tuning import identify, identify_range, identify_result
+from tuning import identify, identify_result
 
 HURST = "hurst_dmb0224c10002"
 
@@ -80,12 +80,6 @@ def test_what_does_not_matter(changes):
 def test_a_hot_motor_is_measured_hot():
     item = run(motor__temp_c=75.0)
     assert item.problems() == [] and item.winding_ohm > 3.1
-
-
-def test_the_whole_range_of_motors_is_measured_or_ends_by_name():
-    cases = identify_range.cases()
-    wrong = {case.name: identify_range.wrong(case, item) for case, item in zip(cases, identify_range.measured(cases, True))}
-    assert wrong == {case.name: [] for case in cases}
 
 
 # ---- troubles --------------------------------------------------------------------------------------------------------------
