@@ -198,6 +198,8 @@ void test_noise_of_one_phase_opens_no_other(void)
 
 #define TURN_STEP 1147u /* angle counts a millisecond: 17.5 turns a second */
 #define TURNS_MS 256u   /* and the rest of a turn is a sum */
+#define EMF_Q12 700
+#define ENDS_Q12 (2 * EMF_Q12 / (int16_t)TURNS_MS) /* what the sum's ends may leave */
 
 /** The look of a millisecond at a rotor with this back-EMF of its own, and one that stands in the stator's frame. */
 static uint16_t offset_look(angle_t angle, int16_t emf_q12, alphabeta_t stands_q12)
@@ -217,7 +219,7 @@ static uint16_t ms_until_offset_at(int16_t omega_erpm, int16_t alpha_q12, int16_
     drive.run.observer.omega_q16 = omega_erpm * 65536;
     while (ms < 3000u && found == (uint16_t)FAULT_NONE) {
         ms++;
-        found = offset_look((angle_t)(ms * step), 700, stands_q12);
+        found = offset_look((angle_t)(ms * step), EMF_Q12, stands_q12);
     }
     TEST_ASSERT_EQUAL_UINT16((ms < 3000u) ? FAULT_CURRENT_SENSOR : FAULT_NONE, found);
     return ms;
@@ -237,7 +239,7 @@ static void expect_offset_found(int16_t alpha_q12, int16_t beta_q12, uint16_t st
 
 void test_a_back_emf_that_stands_in_the_stator_is_found_within_a_second_whatever_its_direction_and_the_rotor_s(void)
 {
-    const int16_t limit = params.adaptation.emf_least_q12, above = (int16_t)(limit + 6), below = (int16_t)(limit - 6);
+    const int16_t limit = params.adaptation.emf_least_q12, above = (int16_t)(limit + ENDS_Q12 + 6), below = (int16_t)(limit - 6);
     EACH_DIRECTION(sign) {
         const uint16_t step = (sign > 0) ? TURN_STEP : (uint16_t)(0u - TURN_STEP);
         EACH_DIRECTION(side) {
@@ -265,6 +267,25 @@ void test_a_speed_that_swings_with_the_turn_leaves_none(void)
         const uint32_t step_q16 = (uint32_t)TURN_STEP * (uint32_t)(65536 + 2 * swing_q15);
         TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, offset_look((angle_t)((angle_q16 + step_q16 / 2u) >> 16), (int16_t)(700 + 700 * (int32_t)swing_q15 / 32768), none));
         angle_q16 += step_q16;
+    }
+}
+
+/** A slow motor's largest back-EMF, far beyond dead time's voltage, in turns that end anywhere in a millisecond, at a constant speed and on a ramp. */
+void test_a_millisecond_more_or_less_of_a_turn_is_no_offset_however_large_the_back_emf(void)
+{
+    static const alphabeta_t none = { 0, 0 };
+    uint16_t step, ms;
+    for (step = 400; step < 6500u; step = (uint16_t)(step + 61u)) {
+        uint32_t angle_q8 = 0, step_q8 = 256u * step;
+        const uint32_t ramp_q8 = (step & 1u) ? 20u : 0u;
+        setUp();
+        drive.run.observer.omega_q16 = 1050 * 65536;
+        for (ms = 0; ms < 2000u; ms++) {
+            const int16_t emf_q12 = (int16_t)(16000 * step_q8 / (256u * step));
+            TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, offset_look((angle_t)((angle_q8 + step_q8 / 2u) >> 8), emf_q12, none));
+            angle_q8 += step_q8;
+            step_q8 += ramp_q8;
+        }
     }
 }
 
