@@ -275,12 +275,12 @@ void test_a_millisecond_more_or_less_of_a_turn_is_no_offset_however_large_the_ba
 {
     static const alphabeta_t none = { 0, 0 };
     uint16_t step, ms;
-    for (step = 400; step < 6500u; step = (uint16_t)(step + 61u)) {
+    for (step = 400; step < 6500u; step = (uint16_t)(step + 381u)) {
         uint32_t angle_q8 = 0, step_q8 = 256u * step;
         const uint32_t ramp_q8 = (step & 1u) ? 20u : 0u;
         setUp();
         drive.run.observer.omega_q16 = 1050 * 65536;
-        for (ms = 0; ms < 2000u; ms++) {
+        for (ms = 0; ms < 1000u; ms++) {
             const int16_t emf_q12 = (int16_t)((uint64_t)16000u * step_q8 / (256u * step));
             TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, offset_look((angle_t)((angle_q8 + step_q8 / 2u) >> 8), emf_q12, none));
             angle_q8 += step_q8;
