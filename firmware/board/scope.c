@@ -401,10 +401,13 @@ static void store(uint16_t address, const uint8_t *from, uint16_t bytes)
     }
 }
 
-/** The answer to service 0. @return its bytes */
-static uint16_t put_info(uint16_t *to)
+/** The answer to service 0. A client is there: the request to record before it may have been refused. @return its bytes */
+static uint16_t put_info(lnet_t *l)
 {
-    uint16_t n;
+    uint16_t n, *to = (uint16_t *)(void *)&l->buffer[AT_PAYLOAD];
+    if (l->scope.words == 0u) {
+        scope_init(&l->scope);
+    }
     for (n = 0; n < INFO_WORDS; n++) {
         to[n] = 0;
     }
@@ -416,15 +419,6 @@ static uint16_t put_info(uint16_t *to)
     return 2u * INFO_WORDS;
 }
 
-/** A client is there. The request to record before it may have been refused. @return the answer's bytes */
-static uint16_t connect(lnet_t *l)
-{
-    if (l->scope.words == 0u) {
-        scope_init(&l->scope);
-    }
-    return put_info((uint16_t *)(void *)&l->buffer[AT_PAYLOAD]);
-}
-
 /** Carries a request out. As many bytes as l->left tells follow the error; where they are is l->source, if not in the buffer.
  *  @param size of the request's data @return the error */
 static uint8_t serve(lnet_t *l, const uint8_t *request, uint16_t size)
@@ -434,7 +428,7 @@ static uint8_t serve(lnet_t *l, const uint8_t *request, uint16_t size)
     uint16_t is_good = 0;
     switch (request[AT_SERVICE]) {
     case LNET_DEVICE_INFO:
-        l->left = connect(l);
+        l->left = put_info(l);
         is_good = 1;
         break;
     case LNET_GET_RAM:

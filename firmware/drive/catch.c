@@ -131,8 +131,7 @@ uint16_t catch_look(drive_t *d, const drive_params_t *p)
     return (uint16_t)(next != CATCH_NO_LOOK);
 }
 
-/** While the bus is too high, for nothing else is waited for so long: 1 when it has not fallen since it was last asked, some tenths of a second
- *  before. */
+/** While the bus is too high, for nothing else is waited for so long: 1 when it has not fallen since it was last asked, some tenths of a second before. */
 static uint16_t catch_bus_stays(drive_t *d)
 {
     catch_t *c = &d->run.catching;

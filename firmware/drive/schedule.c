@@ -124,8 +124,7 @@ static void choose_state(drive_t *d, const drive_params_t *p, const drive_sample
 }
 
 /* wcet: speed_load_moves_against excludes trim_speed/speed_follow */
-/** The speed's error at rest; stall and lost lock. While the innovation gate is open the gains follow here, too; the trim looks at the
- *  load's way only while it is closed, and nothing moves it in between. */
+/** The speed's error at rest; stall and lost lock. While the innovation gate is open the gains follow here, too, and the trim does not look at the load's way. */
 static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     speed_trim_step(d, p);

@@ -13,8 +13,7 @@
 #define BOARD_PERSISTENT
 #endif
 
-/** Of a variable that the firmware writes before it reads it. The start-up code's list of what to clear is nine bytes shorter for a file that has
- *  no others. */
+/** Of a variable that the firmware writes before it reads it. The start-up code's list of what to clear is nine bytes shorter for a file that has no others. */
 #define BOARD_UNSET BOARD_PERSISTENT
 
 /** X(bit, name): the flags of RCON that say why the processor started. */

@@ -20,8 +20,7 @@ typedef struct {
     q15_t cos; /**< Q15 */
 } sincos_t;
 
-/** sin and cos of an angle: nearest table entry, corrected along the derivative: sin(a+x) = sin a + x cos a.
- *  Error at most 12 LSB (0.04 %). */
+/** sin and cos of an angle: nearest table entry, corrected along the derivative: sin(a+x) = sin a + x cos a. Error at most 12 LSB (0.04 %). */
 sincos_t trig_sincos(angle_t angle);
 
 /** Direction of the vector (x, y), to a quarter of a degree; 0 of a vector that has none. @param x,y -32767 .. 32767 */

@@ -79,8 +79,7 @@ void estimator_pll(estimator_t *e, const estimator_params_t *p, const motor_mode
 /** Remembers the vector that was just given to the modulator. */
 void estimator_commanded(estimator_t *e, alphabeta_t v_q13);
 
-/** What follows the speed slowly: the sign of Equation 2, that of Eq, at low speed that of the filtered speed; and the turn of the eight-sample
- *  difference. */
+/** What follows the speed slowly: the sign of Equation 2, that of Eq, at low speed that of the filtered speed; and the turn of the eight-sample difference. */
 void estimator_follow(estimator_t *e, const estimator_params_t *p);
 
 /** Three quarters of the current of six periods ago and a quarter of that of eight: the current of 6.5 periods ago, which is eight before the

@@ -53,8 +53,7 @@ void handover_preset(drive_t *d, const drive_params_t *p, angle_t angle);
 /** The vector that is commanded stays, in a frame that is turned back. @param back angle counts @return cosine and sine of them */
 sincos_t handover_turn_voltage(drive_run_t *run, int16_t back);
 
-/** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are
- *  those of the next sample. */
+/** Bumpless change of frame: currents, voltages and integrators turn from the forced frame into the estimator's. The angles are those of the next sample. */
 void handover_now(drive_t *d, const drive_params_t *p);
 
 /** In RAMP, in the period after handover_wait(), which has time for one of the two. */

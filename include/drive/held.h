@@ -3,8 +3,7 @@
  * The estimator cannot see a rotor that stands: R i and a back-EMF look alike. Its angle runs away, and a shaft that is let go is thrown wherever the
  * angle has come to. So where the rotor may stand, the angle stands, too, and the current with it. A back-EMF that stands still is R i alone: it tells R,
  * and how far the angle had run. One that turns or changes is a rotor that turns, and the estimator goes on. The less back-EMF there is, the longer
- * the question takes: dead time must not hide the turn. A rotor that stands for PARAM_STALL_SEC is a
- * stall as ever. */
+ * the question takes: dead time must not hide the turn. A rotor that stands for PARAM_STALL_SEC is a stall as ever. */
 #ifndef DRIVE_HELD_H
 #define DRIVE_HELD_H
 

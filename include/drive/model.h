@@ -40,8 +40,7 @@ voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p);
  *  lock, with flux, R and L all off; the current is nearly all d current there and says nothing of R. */
 void model_learn_step(drive_t *d, const drive_params_t *p);
 
-/** The motor's constants follow the speed reference, and what was learnt; R a little less while d current of the hand-over is left. Slot 14 in closed
- *  loop. */
+/** The motor's constants follow the speed reference, and what was learnt; R a little less while d current of the hand-over is left. Slot 14 in closed loop. */
 void model_update(drive_t *d, const drive_params_t *p);
 
 /** The same in RAMP. */

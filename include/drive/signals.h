@@ -65,8 +65,7 @@ typedef struct {
 /** Every pass of the background. @return drive_fault_t: OPEN_PHASE when a phase carries next to none of what is asked of it, or none */
 uint16_t signals_phases(signals_t *s, const drive_t *d, const drive_params_t *p);
 
-/** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise
- *  make it, or none */
+/** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise make it, or none */
 uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t *p);
 
 /** Every millisecond in the background, up to 100 turns of the field a second. Over whole turns the mean of a back-EMF is zero in the stator's frame, however the speed swings, for its

@@ -371,8 +371,7 @@ static int16_t answer(const current_q13_t *signal, uint16_t phase)
     return (int16_t)((signal[plus[phase]] - signal[minus[phase]]) / 2);
 }
 
-/** The leg that a signal follows: its answer has the other sign than those to the other two phases. Where one of them says nothing, the
- *  expected leg. */
+/** The leg that a signal follows: its answer has the other sign than those to the other two phases. Where one of them says nothing, the expected leg. */
 static uint16_t leg_of(const current_q13_t *signal, uint16_t expected)
 {
     uint16_t phase, positive = 0, negative = 0;

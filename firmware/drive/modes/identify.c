@@ -561,8 +561,7 @@ static void follow_gains(identify_t *id, uint32_t speed_q10)
 }
 
 /** The current leaves the d axis, and the frame follows the rotor. What pushes first is the current that the friction takes, which is
- *  seen in the back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far as seven eighths of the voltage allow it with
- *  half of the current. */
+ *  seen in the back-EMF's angle, and a sixteenth more. Up to twice END_SPEED_RPM as far as seven eighths of the voltage allow it with half of the current. */
 static void mechanics_start(drive_t *d, const drive_params_t *p)
 {
     static const pi_gains_t gains = { 0, 0, 0, LOOP_SHIFT };

@@ -194,10 +194,8 @@ dq_t identify_voltage(drive_t *d, int16_t sign);
  *  Standing: duties along phase A less the dead-time compensation in them, current of phase A, of phase B, and the bus.
  *  Square voltage: with the sign s as instrument, duties, currents and current differences. A voltage commanded at sample n acts for
  *  one period from the boundary after it, half of it before sample n+1 and half after; so between the last two samples acted
- *  the mean of the vectors commanded one and two periods before this one; where their signs differ it says nothing, else both are
- *  alike.
- *  Turning: voltage d and q (centred on the sample, as commanded a period ago), current d and q.
- *  Following: speed, q current. */
+ *  the mean of the vectors commanded one and two periods before this one; where their signs differ it says nothing, else both are alike.
+ *  Turning: voltage d and q (centred on the sample, as commanded a period ago), current d and q. Following: speed, q current. */
 void identify_add(drive_t *d, const drive_params_t *p);
 
 /** Waits, then adds up, then hands over to the background. @param settled the frame stands or has its speed */

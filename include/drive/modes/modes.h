@@ -70,8 +70,7 @@ uint16_t mode_hands_over(void);
 
 /* ---- TUNING: in closed loop the reference climbs slowly to the maximum speed, whatever the potentiometer says ---- */
 
-/** The speed that the reference goes to. STOPPING ramps to three quarters of the minimum speed, where it ends: the rates follow the
- *  reference. */
+/** The speed that the reference goes to. STOPPING ramps to three quarters of the minimum speed, where it ends: the rates follow the reference. */
 speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t *p);
 
 /** One step of the reference in closed loop. @return 1 if the mode has taken it; a stop is never its own */

@@ -1,5 +1,4 @@
-/* The constants around the law: the start, the limits, and what protects (trip levels, how long a wrong state may last, how far the header
- * may be off).
+/* The constants around the law: the start, the limits, and what protects (trip levels, how long a wrong state may last, how far the header may be off).
  *
  *     align: I(t) = I t/T while the vector turns n times in T:  n/T turns a second        (AN1292: LOCK_TIME)
  *     R of the winding: dv = R I/n from turn to turn                (drive/startup.h), where w psi < 0.4 R I (ALIGN_EMF_MOST)
