@@ -230,6 +230,14 @@ class SpeedLoops:
         return per_speed * current * (shaft * speed + wrong * error) * late / (1.0 - per_current * current)
 
 
+    def closed(self, true: Plant, gains: Gains, omega_e: float) -> tuple[np.ndarray, np.ndarray]:
+        """The shaft's speed per reference; and per torque that brakes it, electrical rad/s per N m."""
+        current, shaft = self._currents(true, replace(gains, speed_kp=0.0, rate=0.0, esdq=0.0))
+        _, per_current, _ = self._laws(gains)
+        opened = 1.0 + self.of(true, gains, omega_e)
+        return gains.speed_kp * current / (1.0 - per_current * current) * shaft / opened, -shaft / true.kt / opened
+
+
 def speed_loop(hz: np.ndarray, true: Plant, assumed: Plant, gains: Gains, omega_e: float) -> np.ndarray:
     """Open speed loop of a motor `true` with controllers made for `assumed`."""
     return SpeedLoops(hz, assumed).of(true, gains, omega_e)

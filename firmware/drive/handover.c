@@ -147,7 +147,7 @@ void handover_observe(drive_run_t *run, const drive_params_t *p)
         return;
     }
     if (run->handover.phase == (uint16_t)START_DONE) {
-        observer_step(&run->observer, &p->observer, run->estimator.rho_q32,
+        observer_step(&run->observer, &p->observer, mode_observed(run),
                       (int16_t)(salient_torque(run, c->i_q13.q) - mode_profile_current(run)));
         if (run->handover.offset != 0) {
             observer_raise_gate(&run->observer); /* dead time shakes the estimate most while the d current falls */

@@ -12,6 +12,7 @@
 static void observe_load(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     (void)raw;
+    mode_sine_step(&d->run);
     if (drive_is_closed(d)) {
         handover_observe(&d->run, p);
     } else if (MODE_ALIGNS) { /* else the mode turns the rotor */

@@ -9,7 +9,7 @@ from tools.common import paths
 
 # Each room may import from itself and from those named with it.
 ROOMS = {"tools.common": (), "tools.image": ("tools.common",), "tools.bench": ("tools.common", "tools.image"),
-         "tools.live": ("tools.common", "tools.image", "tools.bench"), "tuning": ("tools.common", "tools.bench")}
+         "tools.live": ("tools.common", "tools.image", "tools.bench", "tuning"), "tuning": ("tools.common", "tools.bench")}
 MODULES = {f"{room}.{path.stem}": path for room in ROOMS for path in sorted((paths.ROOT / room.replace(".", "/")).glob("[!_]*.py"))}
 
 

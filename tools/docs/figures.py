@@ -138,6 +138,27 @@ def counted(names: list[str]) -> str:
     return ", ".join(f"{names.count(name)} {name}" for name in sorted(set(names))) or "none"
 
 
+def responses() -> Table:
+    """A line for each motor and loop: the margin that was measured, beside the model's; and the steps."""
+    rows = []
+    for motor in paths.names(paths.MOTORS):
+        data = of_motor("response", motor)
+        for row in data["rows"]:
+            rows.append([f"{motor}, {row['loop']}", f"{row['speed_rpm']:.0f} rpm" + (f", {row['load_nm']:.3g} N·m" if row["load_nm"] else ""),
+                         *(f"{row[f'{name}_deg']:.1f}° at {row[f'{name}_hz']:.3g} Hz" for name in ("measured", "model")),
+                         f"{row['measured_deg'] - row['model_deg']:+.1f}°"])
+        for item in data["steps"]:
+            rows.append([f"{motor}, step of the {item['step']}", "", *(_answered(item["step"], item[name]) for name in ("measured", "model")), ""])
+    return ["motor, loop or step", "speed, load", "measured", "tuner's model", "difference"], rows
+
+
+def _answered(step: str, found: dict) -> str:
+    settled = "" if found["settled_s"] is None else f", settled in {found['settled_s'] * 1e3:.3g} ms"
+    if step == "load":
+        return f"dip {found['peak'] * 100.0:.0f} %{settled}"
+    return f"rise {found['rise_s'] * 1e3:.3g} ms, overshoot {max(found['peak'], 0.0) * 100.0:.0f} %{settled}"
+
+
 def helds() -> Table:
     """A line for each motor: a shaft that is held and let go."""
     rows = []
@@ -308,6 +329,7 @@ BLOCKS: dict[str, list[Part]] = {
     "stiffness": [Part(("loadsteps", "lowspeed"), stiffness)],
     "catch": [Part(("catch",), catches)],
     "held": [Part(("held",), helds)],
+    "response": [Part(("response",), responses)],
     "pulse": [Part(("pulse",), pulses)],
     "box": [Part(("box",), boxes)],
     "applications": [Part(("applications",), applications)],

@@ -1,11 +1,17 @@
 # The virtual board in real time: make live, the page; make live-board, its serial line. Variables: MOTOR BOARD DEFINES USERPARAMS as for
-# `make run`; PORT ELF (a real board); CPU=33f (the simulated chip, with XC16=folder or IMAGE=file).
+# `make run`; LOOP SPEED LOAD OUT (make response); PORT ELF (a real board); CPU=33f (the simulated chip, with XC16=folder or IMAGE=file).
 tuned = $(if $(USERPARAMS),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,:))
-.PHONY: live live-pictures live-board live-library live-params setup-live setup-scope
+.PHONY: live response live-pictures live-board live-library live-params setup-live setup-scope
 live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= PORT=/dev/ttyUSB0 ELF= KEPT=file]
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
 	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN))) $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF))) $(if $(KEPT),--kept $(call quoted,$(KEPT)))
+
+response: setup-scope ## [run] open loops measured over the tuner's model, and steps [MOTOR=name or all, LOOP=current or speed, SPEED=rpm LOAD="N m" CPU=33f PORT=/dev/ttyUSB0 ELF= BOARD= DEFINES=-D... USERPARAMS= OUT=]
+	@+$(if $(every),$(every_motor),$(tuned))
+	@$(if $(every),,$(alone) $(python) -m tools.live.response_command $(options) $(if $(LOOP),--loop $(call quoted,$(LOOP))) $(if $(SPEED),--speed $(call quoted,$(SPEED))) \
+	    $(if $(LOAD),--load $(call quoted,$(LOAD))) $(if $(CPU),--cpu $(call quoted,$(CPU))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) \
+	    $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF))))
 
 live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
 	@$(alone) $(python) -m tools.live.pictures

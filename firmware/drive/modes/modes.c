@@ -171,6 +171,45 @@ uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t 
 #endif
 }
 
+INLINE QM_WRAPS dq_t mode_asked(drive_run_t *run)
+{
+    dq_t asked = run->control.ref_q13;
+#if SCOPE
+    sine_t *s = &run->sine;
+    if (s->left != 0u) {
+        int16_t sine;
+        s->angle = (angle_t)(s->angle + s->step);
+        sine = (int16_t)(trig_sincos(s->angle).sin >> 2);
+        asked.d = (int16_t)(asked.d + qm_mulhi(s->size_d, sine));
+        asked.q = (int16_t)(asked.q + qm_mulhi(s->size_q, sine));
+    }
+#endif
+    return asked;
+}
+
+void mode_sine_step(drive_run_t *run)
+{
+#if SCOPE
+    if (run->sine.left != 0u) {
+        run->sine.left--;
+    }
+#else
+    (void)run;
+#endif
+}
+
+uint32_t mode_observed(const drive_run_t *run)
+{
+    uint32_t rho_q32 = run->estimator.rho_q32;
+#if SCOPE
+    const sine_t *s = &run->sine;
+    if (s->left != 0u) {
+        rho_q32 = qm_turn_add(rho_q32, (uint32_t)qm_mulss(s->size_rho_q17, trig_sincos(s->angle).sin));
+    }
+#endif
+    return rho_q32;
+}
+
 void snapshot_tick(snapshot_t *s, const drive_t *d)
 {
     uint16_t row = s->row;

@@ -17,6 +17,8 @@
  * mode_pot_split        BIDIRECTIONAL_SPEED    the potentiometer's direction
  * mode_hands_over       OPEN_LOOP_FUNCTIONING  the hand-over
  * MODE_PARAMS_PLACE     PARAMS_IN_RAM, TUNING  where the parameters are
+ * mode_asked            SCOPE                  the currents that the controllers are asked for
+ * mode_observed         SCOPE                  the angle that the load observer sees
  *
  * SNAPSHOT is called by the board, which owns its arrays. With BRINGUP the board calls bringup_pass() in place of application_tick(). */
 #ifndef DRIVE_MODES_MODES_H
@@ -43,8 +45,25 @@ void mode_start(drive_t *d, const drive_params_t *p);
 
 /* ---- What the modes add to the state of a run: nothing unless userparams.h or DEFINES switches one on ---- */
 
+/* A sine that a client on the serial line adds to measure the loops (make response, docs/response.md); it ends by itself, and with the run.
+ * The current loops are opened at their reference, the speed loop where the load observer gets its angle. */
+#if SCOPE
+/** The sine: the client writes `left` last, and the three sizes within what the loops carry. */
+typedef struct {
+    uint16_t left;        /**< slow steps until it ends, of SLOW_PERIODS; 0: there is none */
+    angle_t step;         /**< of a period, 65536 = one turn */
+    angle_t angle;        /**< in this period */
+    int16_t size_d;       /**< peak beside the d current asked for, an eighth of a count of Q13: at most half of full scale */
+    int16_t size_q;       /**< and beside the q current */
+    int16_t size_rho_q17; /**< peak beside the estimator's angle, turns: at most a quarter */
+} sine_t;
+#define SINE_STATE sine_t sine;
+#else
+#define SINE_STATE
+#endif
+
 /** Members of drive_run_t. */
-#define MODE_STATE IDENTIFY_STATE BRINGUP_STATE PROFILE_STATE
+#define MODE_STATE IDENTIFY_STATE BRINGUP_STATE PROFILE_STATE SINE_STATE
 
 /** 1 where the mode has work in every period. */
 #ifdef SNAPSHOT
@@ -108,6 +127,17 @@ uint16_t mode_current_step(drive_t *d, const drive_params_t *p, current_q13_t *i
 
 /** Why the commanded current is not given. @param reasons the result @return 1 if the mode, and no speed reference, is in command */
 uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t *reasons);
+
+/* ---- SCOPE: the sine that measures the loops ---- */
+
+/** The currents that the controllers are asked for in this period: the references, and the sine's next value. */
+dq_t mode_asked(drive_run_t *run);
+
+/** A slow step of the sine's time. */
+void mode_sine_step(drive_run_t *run);
+
+/** The angle that the load observer sees: the estimator's, and the sine's. @return 2^32 = one turn */
+uint32_t mode_observed(const drive_run_t *run);
 
 /* ---- SNAPSHOT, AN1292's recorder: four arrays filled with one row every SNAPDELAY periods, on request ---- */
 

@@ -1,0 +1,325 @@
+"""`make response`: the open loops of current and speed, measured with the firmware's own sine, over the tuner's model of them; and steps.
+
+    python3 -m tools.live.response_command [--motor NAME] [--loop current|speed] [--speed RPM] [--load N·m] [--port /dev/ttyUSB0]"""
+
+import argparse
+import contextlib
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tools.bench import build, command_common, pil, simulate
+from tools.bench.board import Board, Library
+from tools.bench.plots import plt, saved
+from tools.bench.report import clean
+from tools.bench.scenario import BRAKE
+from tools.bench.scenario_file import MOTOR
+from tools.common import command_line, motor_file, output, paths
+from tools.common.errors import UserError
+from tools.common.progress import Progress
+from tuning import loops
+
+from . import board as live_board
+from . import lnet, response, step
+from .response import Bench, Firmware, Point
+from .symbols import Symbols
+
+OPEN_LOOP = "-DOPEN_LOOP_FUNCTIONING"
+SPEED_SHARE, LOAD_SHARE = 0.5, 0.4
+"""Of the rated speed and torque, where nobody names them: the current is clear of what dead time loses."""
+SETTLE_S = 2.0
+WITHIN_DEG = 3.0
+"""Between the margin that is measured and the model's."""
+ANSWER_S = 20.0
+"""The simulated chip takes its time."""
+CURRENT_STEPS, SPEED_STEPS = 2048, 16384
+"""Of the model's answers, until all has died away."""
+STEP_BANDWIDTHS = 8.0
+"""A speed's record, over its bandwidth."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A loop as it was measured, and the model of it at the same frequencies."""
+
+    loop: str
+    points: list[Point]
+    model: np.ndarray
+    speed_rpm: float
+    load_nm: float | None
+    measured: loops.Margins
+    expected: loops.Margins
+
+    @property
+    def difference_deg(self) -> float:
+        return self.measured.phase_deg - self.expected.phase_deg
+
+    @property
+    def holds(self) -> bool:
+        return abs(self.difference_deg) <= WITHIN_DEG
+
+
+# ---- the tuner's model, with what the firmware uses at this moment ---------------------------------------------------------
+
+def plants(params: dict[str, float], motor: motor_file.Motor | None) -> tuple[loops.Plant, loops.Plant]:
+    """The motor, and what the header says of it; without a motor file both are the header's."""
+    pairs, lq = int(params["NOPOLESPAIRS"]), 1e-3 * params["MOTOR_LS_MH"]
+    psi = params["MOTOR_KPHI_V_PER_KRPM"] / (1000.0 * np.pi / 30.0 * pairs * np.sqrt(3.0))
+    header = loops.Plant(params["MOTOR_RS_OHM"], lq - 1e-6 * params["MOTOR_SALIENCY_UH"], lq, psi, pairs, params["MOTOR_INERTIA_KGM2"])
+    if motor is None:
+        return header, header
+    return loops.Plant(motor.rs_ohm, motor.ld_h, motor.lq_h, motor.psi_vs, motor.pole_pairs, motor.inertia_kgm2 + motor.load_inertia_kgm2,
+                       motor.viscous_nms), header
+
+
+def model_of(loop: str, bench: Bench, motor: motor_file.Motor | None) -> Callable[[np.ndarray], np.ndarray]:
+    """The open loop over the frequency. Gains that follow the speed are read from the firmware."""
+    true, header = plants(bench.params, motor)
+    gains, omega_e = _gains(bench), abs(bench.speed_rpm()) * bench.params["NOPOLESPAIRS"] * np.pi / 30.0
+    if loop == "current":
+        if bench.state() != "CLOSED": # without load the rotor's d axis lies along the forced angle's current
+            true = replace(true, ld=true.lq, lq=true.ld)
+        return lambda hz: of_q_current(hz, true, gains, omega_e)
+    return lambda hz: loops.speed_loop(hz, true, header, gains, omega_e)
+
+
+def of_q_current(hz: np.ndarray, plant: loops.Plant, gains: loops.Gains, omega_e: float) -> np.ndarray:
+    """The q axis' loop while that of the d axis is closed. The complex loop of a frame that turns is a + j b at the positive, the conjugate of a - j b at
+    the negative frequency: a along each axis, b from one to the other."""
+    def parts(axis: str) -> tuple[np.ndarray, np.ndarray]:
+        there, back = (loops.current_loop(sign * hz, plant, gains, omega_e, axis) for sign in (1.0, -1.0))
+        return 0.5 * (there + np.conj(back)), -0.5j * (there - np.conj(back))
+    (along_d, across_d), (along_q, across_q) = parts("d"), parts("q")
+    return along_q + across_d * across_q / (1.0 + along_d)
+
+
+def answers_of(name: str, bench: Bench, motor: motor_file.Motor | None, load_nm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times since a step, and what the model answers."""
+    period_s = bench.period_s
+    if name == "current":
+        hz = np.arange(1, CURRENT_STEPS // 2 + 1) / CURRENT_STEPS / period_s
+        loop = model_of("current", bench, motor)(hz)
+        return np.arange(CURRENT_STEPS) * period_s, step.answer_of(np.concatenate([[1.0], loop / (1.0 + loop)]))
+    true, header = plants(bench.params, motor)
+    slow_s, omega_e = response.SLOW_PERIODS * period_s, abs(bench.speed_rpm()) * bench.params["NOPOLESPAIRS"] * np.pi / 30.0
+    hz = np.arange(1, SPEED_STEPS // 2 + 1) / SPEED_STEPS / slow_s
+    base = _gains(bench)
+    if name == "load": # the innovation's gate opens
+        base = loops.speed_gains(header, bench.params["SPEED_BANDWIDTH_HZ"], bench.params["LOAD_BANDWIDTH_HZ"], base, omega_e)["quick"]
+    reference, torque = loops.SpeedLoops(hz, header).closed(true, base, omega_e)
+    closed = np.concatenate([[1.0], reference]) if name == "speed" else np.concatenate([[0.0], torque * load_nm / omega_e])
+    return np.arange(SPEED_STEPS) * slow_s, step.answer_of(closed)
+
+
+def _gains(bench: Bench) -> loops.Gains:
+    """Those that the firmware uses at this moment."""
+    params, get = bench.params, bench.firmware.get
+    rad_s = params["COUNT_SPEED_RPM"] * params["NOPOLESPAIRS"] * np.pi / 30.0
+    return loops.Gains(params["CURRENT_KP_D"], params["CURRENT_KP_Q"], params["CURRENT_KI"],
+                       get(f"{response.RUN}.control.speed_kp_q13") / 8192.0 * params["COUNT_CURRENT_A"] / rad_s,
+                       get(f"{response.RUN}.observer.rate_q16") / response.TURN, get(f"{response.RUN}.model.kfilter_esdq_q16") / response.TURN, bench.period_s)
+
+
+# ---- boards ------------------------------------------------------------------------------------------------------------------
+
+@dataclass
+class Place:
+    """A board with a motor, whichever, and how it ends."""
+
+    bench: Bench
+    motor: motor_file.Motor | None
+    board: Board | None
+    """the virtual one"""
+    title: str
+    path: str
+    """of the motor's file"""
+
+
+def virtual(options: argparse.Namespace, loop: str) -> Place:
+    """A virtual board, or the image in the simulated chip. The current loop is measured with the forced angle, whose frame does not move with the
+    current (docs/response.md)."""
+    defines = f"{options.defines} {OPEN_LOOP if loop == 'current' else ''}".strip()
+    parts = live_board.parts(options.motor, options.board, defines, options.userparams, options.cpu)
+    if not parts.library.params["SCOPE"]:
+        raise UserError("the firmware has no sine for its loops", "response", "build it with SCOPE 1")
+    live = live_board.LiveBoard(parts)
+    link = lnet.connect(live_board.BoardStream(live))
+    link.answer_s = ANSWER_S
+    return Place(Bench(Firmware(link, Symbols.read(parts.symbols)), parts.library.params, live.run), motor_file.load(str(parts.motor.path)), live.board,
+                 parts.motor.title, str(paths.shown(parts.motor.path)))
+
+
+def real(options: argparse.Namespace) -> Place:
+    """A board at a serial port."""
+    header = command_common.header_for(options)
+    library = Library(build.library(live_board.with_scope(command_common.macros(options.defines)), build.header_folder(header) if header else None, "live-library"))
+    motor = motor_file.load(options.motor) if options.motor else None
+    symbols = Symbols.read(options.elf or paths.ROOT / "build" / "target" / "foc33.elf")
+    try:
+        link = lnet.connect(options.port)
+    except lnet.LnetError as error:
+        raise UserError(str(error), options.port, "is it this port, is the board on, is its firmware built with SCOPE 1?") from None
+    return Place(Bench(Firmware(link, symbols), library.params), motor, None, *((motor.title, str(paths.shown(motor.path))) if motor else ("the header's motor", "")))
+
+
+# ---- measuring ---------------------------------------------------------------------------------------------------------------
+
+def measured(place: Place, loop: str, options: argparse.Namespace) -> tuple[Result, list[step.Answer]]:
+    """Starts the motor, measures the loop and its steps, stops."""
+    bench, motor, load_nm = place.bench, place.motor, None
+    rated_rpm = motor.rated_speed_rpm if motor else bench.params["NOMINAL_SPEED_RPM"]
+    bench.start(options.speed or max(SPEED_SHARE * rated_rpm, bench.params["MINIMUM_SPEED_RPM"]))
+    try:
+        if loop == "speed" and place.board is not None and motor is not None:
+            load_nm = options.load if options.load is not None else LOAD_SHARE * motor.rated_torque_nm
+            place.board.set(BRAKE, load_nm)
+            bench.pause(SETTLE_S)
+        frequencies, model, speed_rpm = bench.frequencies(loop), model_of(loop, bench, motor), bench.speed_rpm()
+        found: list[Point] = []
+        with Progress(f"{loop} loop", len(frequencies), unit="frequencies") as progress:
+            for point in bench.points(loop, frequencies):
+                found.append(point)
+                progress(1)
+        answers = _answers(place, loop, load_nm)
+    except lnet.LnetError as error:
+        raise UserError(str(error), "response", "is the board still on?") from None
+    finally:
+        with contextlib.suppress(lnet.LnetError):
+            bench.stop()
+    hz = np.array([point.hz for point in found])
+    expected = model(hz)
+    return Result(loop, found, expected, speed_rpm, load_nm, loops.margins(hz, np.array([point.response for point in found])), loops.margins(hz, expected)), answers
+
+
+def _answers(place: Place, loop: str, load_nm: float | None) -> list[step.Answer]:
+    """The steps that go with a loop; that of the load is the virtual board's brake."""
+    bench, motor, board = place.bench, place.motor, place.board
+    if loop == "current":
+        return [_answer("current", *step.current(bench), *answers_of("current", bench, motor, 0.0))]
+    seconds = STEP_BANDWIDTHS / bench.params["SPEED_BANDWIDTH_HZ"]
+    expected = answers_of("speed", bench, motor, 0.0)
+    found = [_answer("speed", *step.speed(bench, seconds), *expected)]
+    if board is not None and load_nm is not None:
+        board.set(BRAKE, 0.0)
+        bench.pause(SETTLE_S)
+        found.append(_answer("load", *step.load(bench, seconds, lambda: board.set(BRAKE, load_nm)), *answers_of("load", bench, motor, load_nm)))
+    return found
+
+
+def _answer(name: str, time_s: np.ndarray, values: np.ndarray, model_s: np.ndarray, model: np.ndarray) -> step.Answer:
+    return step.Answer(name, time_s, values, np.interp(time_s, model_s, model, left=0.0))
+
+
+def text(results: list[Result], answers: list[step.Answer], title: str) -> str:
+    """The table."""
+    lines = [title, "", "loop       speed    load        measured                 tuner's model            difference"]
+    for item in results:
+        load = "" if item.load_nm is None else f"{item.load_nm:.3g} N m"
+        lines.append(f"{item.loop:8}{item.speed_rpm:6.0f} rpm  {load:9}  {_margin(item.measured):23}  {_margin(item.expected):23}  {item.difference_deg:+.1f} degrees"
+                     + ("" if item.holds else f"  ! more than {WITHIN_DEG:g}"))
+    lines += ["", "step        measured: rise / overshoot, of a load dip / settled     tuner's model"]
+    lines += [f"{item.step:10}  {_figures(item, item.measured):50}  {_figures(item, item.expected)}" for item in answers]
+    return "\n".join(lines)
+
+
+def _figures(answer: step.Answer, values: np.ndarray) -> str:
+    found = step.figures(answer.step, answer.time_s, values)
+    rise = "-" if found.rise_s is None else f"{found.rise_s * 1e3:.3g} ms"
+    return f"{rise} / {max(found.peak, 0.0):.1%} / " + ("not in the record" if found.settled_s is None else f"{found.settled_s * 1e3:.3g} ms")
+
+
+def write_answer(folder: Path, answer: step.Answer, title: str) -> None:
+    """Plot and numbers of a step."""
+    output.write_csv(folder / f"step_{answer.step}.csv", ["time_s", "measured", "model"],
+                     [[f"{number:.6g}" for number in row] for row in zip(answer.time_s, answer.measured, answer.expected)])
+    figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
+    for values, colour, label in ((answer.expected, "tab:blue", "tuner's model"), (answer.measured, "tab:orange", "measured")):
+        axes.plot(answer.time_s * 1e3, values, color=colour, label=f"{label}: {_figures(answer, values)}")
+    axes.set(title=f"{title}: step of the {answer.step}", xlabel="time since the step [ms]",
+             ylabel="change of the speed, of the speed" if answer.step == "load" else "change, of the step")
+    axes.legend()
+    saved(figure, folder, f"step_{answer.step}")
+
+
+def _margin(margins: loops.Margins) -> str:
+    return f"{margins.phase_deg:.1f} degrees at {margins.crossover_hz:.3g} Hz"
+
+
+def write(folder: Path, result: Result, title: str) -> None:
+    """Plot and numbers of a loop."""
+    rows = [[f"{point.hz:.6g}", *(f"{number:.6g}" for value in (point.response, model) for number in (20.0 * np.log10(abs(value)), np.degrees(np.angle(value)))),
+             f"{point.spread:.3g}"] for point, model in zip(result.points, result.model)]
+    output.write_csv(folder / f"{result.loop}.csv", ["hz", "measured_db", "measured_deg", "model_db", "model_deg", "spread"], rows)
+    figure, (size, phase) = plt.subplots(2, 1, sharex=True, figsize=(8, 5.6), layout="constrained")
+    hz, response = np.array([point.hz for point in result.points]), np.array([point.response for point in result.points])
+    for values, colour, marks, label in ((result.model, "tab:blue", "", "tuner's model"), (response, "tab:orange", "o", "measured")):
+        size.semilogx(hz, 20.0 * np.log10(np.abs(values)), marker=marks, markersize=4, color=colour, label=label)
+        phase.semilogx(hz, np.degrees(np.angle(values)) % -360.0, marker=marks, markersize=4, color=colour)
+    for margins, colour in ((result.expected, "tab:blue"), (result.measured, "tab:orange")):
+        phase.plot(margins.crossover_hz, margins.phase_deg - 180.0, "*", markersize=10, color=colour)
+    size.axhline(0.0, color="black", linewidth=0.8)
+    phase.axhline(-180.0, color="black", linewidth=0.8)
+    size.set(title=f"{title}: open {result.loop} loop at {result.speed_rpm:.0f} rpm\nphase margin {_margin(result.measured)} measured, {_margin(result.expected)} by the model",
+             ylabel="gain [dB]")
+    phase.set(xlabel="frequency [Hz]", ylabel="phase [°]", ylim=(-270.0, 0.0), yticks=range(-270, 1, 45))
+    size.legend()
+    saved(figure, folder, result.loop)
+
+
+def _summary(results: list[Result], answers: list[step.Answer], place: Place) -> dict[str, Any]:
+    rows = [{"loop": item.loop, "speed_rpm": item.speed_rpm, "load_nm": item.load_nm, "measured_deg": item.measured.phase_deg, "measured_hz": item.measured.crossover_hz,
+             "model_deg": item.expected.phase_deg, "model_hz": item.expected.crossover_hz, "ok": item.holds} for item in results]
+    steps = [{"step": item.step, "measured": vars(step.figures(item.step, item.time_s, item.measured)),
+              "model": vars(step.figures(item.step, item.time_s, item.expected))} for item in answers]
+    return clean({"title": place.title, "motor": place.path, "rows": rows, "steps": steps, "passed": all(item.holds for item in results),
+                  "expectations": [{"name": f"{item.loop} loop's phase margin is the model's", "ok": item.holds} for item in results]})
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = command_line.Parser(prog="python3 -m tools.live.response_command", description=__doc__.splitlines()[0])
+    command_common.add_options(parser, "response", without=("library", "quiet"))
+    parser.add_argument("--loop", choices=response.LOOPS, help="one of the two; default both, with --port the speed loop")
+    parser.add_argument("--speed", type=float, metavar="RPM", help=f"of the motor; default {SPEED_SHARE:.0%} of the rated one")
+    parser.add_argument("--load", type=float, metavar="NM", help=f"on the virtual board; default {LOAD_SHARE:.0%} of the rated torque")
+    parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
+    parser.add_argument("--cpu", choices=("host", "33f"), default="host", help="33f: an image of XC16 in the instruction-set simulator")
+    parser.add_argument("--port", help="serial port of a real board, whose firmware has SCOPE 1")
+    parser.add_argument("--elf", type=Path, metavar="FILE", help="ELF file of the firmware on it; default build/target/foc33.elf")
+    parser.set_defaults(command=_run)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    asked = [options.loop] if options.loop else ["speed"] if options.port else list(response.LOOPS)
+    results: list[Result] = []
+    answers: list[step.Answer] = []
+    with output.ResultFolder(command_common.results("response", MOTOR, options)) as folder:
+        for loop in asked:
+            place = real(options) if options.port else virtual(options, loop)
+            found, steps = measured(place, loop, options)
+            write(folder.work, found, place.title)
+            for answer in steps:
+                write_answer(folder.work, answer, place.title)
+            results, answers = [*results, found], answers + steps
+            if place.board is not None:
+                place.board.close()
+        table = text(results, answers, place.title)
+        (folder.work / "summary.txt").write_text(table + "\n", encoding="utf-8")
+        output.write_summary(folder.work, _summary(results, answers, place))
+    print(table + f"\n\nresults in {paths.shown(folder.target)}/: " + ", ".join(f"{name}.png" for name in [*(item.loop for item in results), *(f"step_{item.step}" for item in answers)]))
+    held = sum(item.holds for item in results)
+    print(f"{held} of {len(results)} expectations hold")
+    return 0 if held == len(results) else 1
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command; returns the exit code."""
+    return command_line.main(_parser, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

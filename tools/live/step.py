@@ -1,0 +1,138 @@
+"""Measures what a motor does after a step of the q current, of the speed reference and of the load, over any link of the scope's.
+
+The firmware's sine without a frequency is a constant beside the q current asked for (firmware/drive/modes/modes.c): its begin is the step."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .lnet import Channel, Trigger
+from .response import CURRENT_SHARE, POLL_S, RUN, SINE, TURN, Bench
+
+STEPS = ("current", "speed", "load")
+CURRENT_RECORDS = 8
+"""Whose mean is the current's answer."""
+SPEED_STEP = 0.1
+"""Of the speed."""
+BEFORE = 0.1
+"""Of a record, before the step."""
+SETTLED = {"current": 0.1, "speed": 0.1, "load": 0.02}
+"""Of the step, of the load's: of the speed."""
+QUARTER = 16384
+REST_S = 0.5
+LEFT_STEPS = 100
+"""Of 0.4 ms, that the current's step lasts."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A step's answer over the time since the step: 0 before and 1 afterwards; after a load, the speed's share that is missing."""
+
+    step: str
+    time_s: np.ndarray
+    measured: np.ndarray
+    expected: np.ndarray
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What is told of an answer."""
+
+    rise_s: float | None
+    """from 10 to 90 %; a load has none"""
+    peak: float
+    """beyond 1; of a load, the dip"""
+    settled_s: float | None
+    """None: not within the record"""
+
+
+def figures(step: str, time_s: np.ndarray, values: np.ndarray) -> Figures:
+    """Rise, overshoot and settling time of an answer."""
+    after = time_s >= 0.0
+    at, value = time_s[after], values[after]
+    final = 0.0 if step == "load" else 1.0
+    outside = np.nonzero(np.abs(value - final) > SETTLED[step])[0]
+    settled = 0.0 if not len(outside) else None if outside[-1] + 1 >= len(at) else float(at[outside[-1] + 1])
+    if step == "load":
+        return Figures(None, float(-value.min()), settled)
+    rise = [float(np.interp(level, np.maximum.accumulate(value), at)) for level in (0.1, 0.9)]
+    return Figures(rise[1] - rise[0], float(value.max() - 1.0), settled)
+
+
+def answer_of(closed: np.ndarray) -> np.ndarray:
+    """The step's answer of a closed loop that is given at the frequencies k/(2 n T) from 0 to the Nyquist frequency."""
+    return np.cumsum(np.fft.irfft(closed))
+
+
+def current(bench: Bench) -> tuple[np.ndarray, np.ndarray]:
+    """Times since the step, and the q current as a share of it."""
+    firmware, names = bench.firmware, [f"{SINE}.left", f"{RUN}.control.i_q13.q", f"{RUN}.control.ref_q13.q", f"{RUN}.control.i_q13.d"]
+    size, records = round(8.0 * CURRENT_SHARE * bench.params["MAXIMUM_CURRENT_A"] / bench.params["COUNT_CURRENT_A"]), []
+    for name, value in (("left", 0), ("step", 0), ("angle", QUARTER), ("size_d", 0), ("size_q", size), ("size_rho_q17", 0)):
+        firmware.put(f"{SINE}.{name}", value)
+    left = firmware.of(f"{SINE}.left")
+    rows = firmware.link.scope_state().size // (2 * len(names))
+    before = round(BEFORE * rows)
+    for _ in range(CURRENT_RECORDS):
+        bench.pause(0.05)
+        firmware.link.scope_setup([Channel(item.address, item.bytes, item.signed) for item in map(firmware.of, names)],
+                                  Trigger(left.address, 1, True, False), -before, 1)
+        bench.pause(0.02)
+        firmware.put(left.name, LEFT_STEPS)
+        while firmware.link.scope_state().running:
+            bench.pause(POLL_S)
+        record = np.array(firmware.link.scope_read(), dtype=float)
+        bench.pause(LEFT_STEPS * 8.0 * bench.period_s)
+        records.append((record[:, 1] - record[:before - 1, 1].mean()) / (size / 8.0))
+    shortest = min(map(len, records))
+    return (np.arange(shortest) - before) * bench.period_s, np.mean([record[:shortest] for record in records], axis=0)
+
+
+def _record(bench: Bench, seconds: float, act: Callable[[], None]) -> tuple[np.ndarray, np.ndarray]:
+    """Times, and the estimated speed in electrical rpm: a record during which something is done."""
+    firmware, name = bench.firmware, f"{RUN}.observer.omega_q16"
+    firmware.put(f"{SINE}.left", 0)
+    bench.pause(REST_S)
+    rows = firmware.link.scope_state().size // 4
+    factor = max(1, round(seconds / rows / bench.period_s))
+    firmware.link.scope_setup([firmware.of(name).channel], factor=factor)
+    bench.pause(BEFORE * seconds)
+    act()
+    while firmware.link.scope_state().running:
+        bench.pause(POLL_S)
+    record = np.array(firmware.link.scope_read(), dtype=float)[:, 0] / TURN
+    return np.arange(len(record)) * factor * bench.period_s, record
+
+
+def speed(bench: Bench, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """A step of the reference, past its ramp."""
+    firmware, reference = bench.firmware, f"{RUN}.control.reference_erpm"
+    before = firmware.get(reference)
+    target = before + round(SPEED_STEP * before)
+
+    def act() -> None:
+        firmware.put("scope_command.target_erpm", target)
+        firmware.put(reference, target)
+    time_s, erpm = _record(bench, seconds, act)
+    firmware.put("scope_command.target_erpm", before)
+    bench.pause(seconds)
+    share = (erpm - erpm[:max(2, round(0.5 * BEFORE * len(erpm)))].mean()) / (target - before)
+    return time_s - _begin(time_s, share), share
+
+
+def load(bench: Bench, seconds: float, act: Callable[[], None]) -> tuple[np.ndarray, np.ndarray]:
+    """A load that `act` puts on: the speed's change, of the speed."""
+    time_s, erpm = _record(bench, seconds, act)
+    first = erpm[:max(2, round(0.5 * BEFORE * len(erpm)))].mean()
+    share = erpm / first - 1.0
+    return time_s - _begin(time_s, -share), share
+
+
+def _begin(time_s: np.ndarray, share: np.ndarray) -> float:
+    """When something begins: the straight line through a quarter and a half of the largest, at 0."""
+    half = int(np.argmax(share >= 0.5 * share.max()))
+    quarter = half - int(np.argmax(share[half::-1] < 0.25 * share.max()))
+    low, high = (time_s[k - 1] + (level * share.max() - share[k - 1]) / (share[k] - share[k - 1]) * (time_s[k] - time_s[k - 1])
+                 for k, level in ((quarter + 1, 0.25), (half, 0.5)))
+    return max(0.0, float(2.0 * low - high))
