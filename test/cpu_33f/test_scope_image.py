@@ -13,6 +13,8 @@ from tools.live.symbols import Symbols
 pytestmark = pytest.mark.xc16
 OFF_CYCLES, MOST_CYCLES = 3, 35
 """Without a record; with four channels of 16 bits, whatever the scope does in the period."""
+SINE_CYCLES = 40
+"""Most that the sine takes of a period of the control interrupt while it runs (docs/response.md)."""
 SLOW_PHASES = 32
 """Periods after which an interrupt of the drive at rest costs the same again."""
 CHANNELS = ("board_drive.phases_q13.a", "board_drive.phases_q13.b", "board_drive.ticks", "board_drive.angle")
@@ -22,13 +24,13 @@ ENOUGH_S = 0.02
 
 
 class Bench:
-    """A board at rest with a client."""
+    """A board with a client, at rest."""
 
     def __init__(self, parts: live_board.Parts) -> None:
-        self.live, symbols = live_board.LiveBoard(parts), Symbols.read(parts.symbols)
+        self.live, self.symbols = live_board.LiveBoard(parts), Symbols.read(parts.symbols)
         self.link = lnet.connect(live_board.BoardStream(self.live))
-        self.channels = [symbols.find(name).channel for name in CHANNELS]
-        self.watched = symbols.find("scope_command.target_erpm")
+        self.channels = [self.symbols.find(name).channel for name in CHANNELS]
+        self.watched = self.symbols.find("scope_command.target_erpm")
         self.live.run(0.2)
         self.periods = 0
         self.live.board.trace_start(["cpu.slow_cycles"], 1)
@@ -97,3 +99,29 @@ def test_waiting_and_the_trigger_itself(bench: Bench) -> None:
             # the trigger comes at various places in the array
             costs = [cycles for n in range(16) for cycles in bench.record(True, delay, rising, n * bench.live.period_s)]
             assert min(costs) == OFF_CYCLES < max(costs) <= MOST_CYCLES, (delay, rising)
+
+
+def test_sine_beside_the_currents_costs_a_period_no_more_than_it_is_said_to(bench: Bench) -> None:
+    live, symbols = bench.live, bench.symbols
+
+    def put(name: str, value: int) -> None:
+        variable = symbols.find(name)
+        bench.link.write(variable.address, variable.data(value))
+
+    def interrupt(left: int) -> np.ndarray:
+        """Cycles of the control interrupt while the rotor is aligned, where nothing else changes from turn to turn of the slow phases."""
+        put("board_drive.run.sine.left", left)
+        live.board.trace_take()
+        live.board.trace_start(["cpu.isr_cycles"], 1)
+        live.run(0.02)
+        return live.board.trace_take()[:, 0]
+    put("scope_command.lease_ms", 5000)
+    put("scope_command.mode", 1)
+    put("scope_command.run", 1)
+    live.run(0.3)
+    put("board_drive.run.sine.step", 3000)
+    put("board_drive.run.sine.size_q", 400)
+    without, running = interrupt(0), interrupt(1000)
+    put("scope_command.run", 0)
+    more = running.mean() - without.mean()
+    assert 20.0 < more <= SINE_CYCLES and running.max() - without.max() <= SINE_CYCLES
