@@ -6,6 +6,7 @@ pil-library:
 # Private: what they depend on, the flags file, is everybody's.
 pil_objects := $(patsubst %.c,$B/%.o,$(wildcard tools/cpu_33f/*.c))
 $(pil_objects): private INCLUDES += $(board_includes) -Itools/cpu_33f
+$(pil_objects): private CFLAGS += -O2
 
 # The probe reads the image's RAM with the law's own functions in the image's layout: they are its own.
 $B/tools/cpu_33f/iss_probe.o: tools/cpu_33f/iss_probe.c $B/law.c $B/flags | $B/params
