@@ -379,11 +379,11 @@ modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_t
 
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps, no search for a parameter's ends.
 slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps sensitivity image_build examples progress recipes bench_pages userparams import live_% make_% campaign setup suites),$(bench_py))
-sweep_suites := $(addprefix behaviour/test_,identify_motors identify_ranges fw_search low_speeds)
-release_suites := tools/test_tune_remedies
-longest := $(slow_suites)
+# Have tests for a release alone, with every motor.
+release_suites := tools/test_tune_remedies $(addprefix behaviour/test_,identify_motors identify_ranges low_speeds)
+longest := $(slow_suites) $(addprefix behaviour/test_,identify_motors fw_search)
 quick_suites := $(filter-out golden/% unit/test_param_ranges,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
-all_suites := $(filter-out $(release_suites),$(tools_py) $(longest) $(filter-out $(longest) $(sweep_suites),$(bench_py))) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
+all_suites := $(filter-out tools/test_tune_remedies,$(tools_py) $(longest) $(filter-out $(longest),$(bench_py))) $(source_py) $(behaviour_c) $(unit_c) $(board_c)
 
 # Every chosen suite runs anew. make leaves a stamp for each that it could build; one without has failed.
 chosen = $(if $(ONLY),$(filter $(foreach name,$(ONLY),$(name) %/$(name)),$1),$1)
@@ -397,14 +397,12 @@ run_suites = +@$(if $(call unknown_suites,$1),echo "foc33: no suite '$(call unkn
     PIL_LIBRARY=$B/libpil.so $(alone) $(python) -m pytest -qq -rN --capture=sys --tb=short --continue-on-collection-errors --basetemp=$T/tmp \
     --jobs $$(getconf _NPROCESSORS_ONLN) --build $T --made $T/made $2 $(call suite_files,$(call chosen,$1))
 
-.PHONY: test test-quick test-sweeps test-release setup-test setup-checks
-test: setup-test setup-checks ## [tests] every test but the sweeps; the last line is "N passed, N failed" [ONLY="test_pi ..."]
-	$(call run_suites,$(all_suites) $(if $(ONLY),$(sweep_suites) $(release_suites)),$(if $(ONLY),,--summary $T/summary.json))
+.PHONY: test test-quick test-release setup-test setup-checks
+test: setup-test setup-checks ## [tests] every test but those for a release; the last line is "N passed, N failed" [ONLY="test_pi ..."]
+	$(call run_suites,$(all_suites),$(if $(ONLY),,--summary $T/summary.json))
 
-test-sweeps: setup-test ## [tests] identification and lowest speed of every motor, and the field-weakening search
-	$(call run_suites,$(sweep_suites))
-
-test-release: setup-test ## [tests] every remedy that the tuner names is tried: ten minutes, before a release
+test-release: export PYTEST_ADDOPTS := -m release
+test-release: setup-test ## [tests] every motor is identified and held at its lowest speed, every remedy that the tuner names is tried: before a release
 	$(call run_suites,$(release_suites))
 
 test-quick: setup-test ## [tests] the tests for the edit loop [ONLY="test_pi ..."]

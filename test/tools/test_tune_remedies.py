@@ -13,6 +13,8 @@ from tools.common import board_file, motor_file
 from tuning import design_warnings
 from tuning.design import Design, design
 
+pytestmark = pytest.mark.release
+
 NUMBER = r"([\d.]+(?:e-?\d+)?)"
 MOTOR_KEYS = {"[rating] current": "rated_current_a", "[rating] torque": "rated_torque_nm", "the rated speed": "rated_speed_rpm", "[rating] maximum_speed": "maximum_speed_rpm",
               "[rating] maximum_current": "maximum_current_a", "[load] inertia": "load_inertia_kgm2", "[load] start_torque": "start_torque_nm",

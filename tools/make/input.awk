@@ -6,7 +6,7 @@
 # What a target reads is in the brackets of its line in the list. Beside that:
 BEGIN {
     names("V INSTALL FOC33_QUIET CC PYTHON RUBY SHELL MAKE MAKEFLAGS GNUMAKEFLAGS XC16 DFP", everywhere)
-    names("lib vboard bench iss examples test test-quick test-sweeps test-release test-target firmware flash size", compiles)
+    names("lib vboard bench iss examples test test-quick test-release test-target firmware flash size", compiles)
     names("VARIANT SAN DEFINES USERPARAMS APP WERROR OPT CFLAGS warnings sanitizer", compilation)
 }
 
