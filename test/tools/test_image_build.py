@@ -85,14 +85,10 @@ def test_the_successor_xc_dsc_is_found_by_its_own_names_where_there_is_no_xc16(t
     assert all(("-U__XC16__ -D__XC16__" in call) == defined for call in calls)
 
 
-MEMORY_OF_ITS_OWN = ("TUNING", "TORQUE_PROFILE", "SNAPSHOT", "IDENTIFY", "BRINGUP")
-"""Modes that share the RAM with the scope; the others without it: test/image/test_modes.py."""
-
-
 # ---- with it -------------------------------------------------------------------------------------------------------------
 @needs_compiler
-@pytest.mark.parametrize("word", ["OPT=-O1", "OPT=-O3", *(f"DEFINES=-DSCOPE=1 -D{mode}" for mode in MEMORY_OF_ITS_OWN)])
-def test_no_warning_and_a_good_image_at_every_level_and_with_the_scope_in_modes_with_memory_of_their_own(word):
+@pytest.mark.parametrize("word", ["OPT=-O1", "OPT=-O3"])
+def test_no_warning_and_a_good_image_at_every_level(word):
     build_image(word, "VARIANT=check")
 
 
@@ -124,11 +120,14 @@ def test_a_compiler_under_xc_dsc_s_names_makes_the_same_image(tmp_path):
 
 @needs_compiler
 def test_other_flags_rebuild_and_the_same_flags_do_not():
-    elf, times = ROOT / "build/target-check/foc33.elf", []
+    """One file of the image: all follow the same record of the flags."""
+    file, times = "build/target-check/firmware/control/svm.o", []
     for words in ([], [], ["DEFINES=-DPARAMS_IN_RAM"]):
-        assert make("firmware", "VARIANT=check", *words).returncode == 0
-        times.append(elf.stat().st_mtime_ns)
+        assert make(file, "VARIANT=check", *words).returncode == 0
+        times.append((ROOT / file).stat().st_mtime_ns)
     assert times[0] == times[1] != times[2]
+    rules = (ROOT / "tools/make/image.mk").read_text(encoding="utf-8")
+    assert all(re.search(rf"^\$X/{name}: .*\$X/flags", rules, re.MULTILINE) for name in (r"image\.o", r"app\.o", "%\\.o"))
 
 
 # ---- sources with a mistake, in a copy of the project ----------------------------------------------------------------------
@@ -164,9 +163,9 @@ def tree(tmp_path):
 
 
 HEAD = "void firmware_background(void)\n{\n"
-NUMBERS, NOINLINE = "static volatile int32_t spoil_a, spoil_b;", "static __attribute__((noinline)) void"
-RECURSIVE = (f"{NOINLINE} spoil(volatile uint16_t n);\n{NOINLINE} spoil(volatile uint16_t n)\n{{\n    if (n) {{\n"
-             "        spoil((uint16_t)(n - 1u));\n        n = 3;\n    }\n}")
+NOINLINE = "static __attribute__((noinline)) void"
+RECURSIVE = (f"{NOINLINE} again(volatile uint16_t n);\n{NOINLINE} again(volatile uint16_t n)\n{{\n    if (n) {{\n"
+             "        again((uint16_t)(n - 1u));\n        n = 3;\n    }\n}")
 
 
 def _frame(name: str, calls: str) -> str:
@@ -174,26 +173,30 @@ def _frame(name: str, calls: str) -> str:
     return f"{NOINLINE} {name}(void)\n{{\n    volatile uint16_t some[62];\n    some[0] = 1;\n    {calls}\n    some[1] = 1;\n}}\n"
 
 
-DEEP = _frame("deepest", "") + _frame("deeper", "deepest();") + _frame("spoil", "deeper();")
+DEEP = _frame("deepest", "") + _frame("deeper", "deepest();") + _frame("deep", "deeper();")
+LINE = r"firmware_background\(\) \(firmware/board/firmware.c, line [0-9]+\)"
+NOT_CALCULABLE = (
+    ("again(board_drive.ticks);", RECURSIVE, "stack: recursion: again -> again"),
+    ("pointer();", "extern void (*volatile pointer)(void);\nvoid (*volatile pointer)(void) = pwm_init;",
+     r"stack: \w+: call through a pointer at 0x[0-9a-f]+, firmware_background\(\) of firmware/board/firmware.c"))
+TOO_MUCH = (
+    ("spoil_a = (int32_t)((float)spoil_b * 1.5F);", "static volatile int32_t spoil_a, spoil_b;", rf"called by {LINE}: a float: use a Q format"),
+    ("spoil_a = spoil_a / spoil_b;", "", rf"called by {LINE}: a division: use qm_divud"),
+    ("spoil_c = spoil_c / board_drive.ticks;", "static volatile int64_t spoil_c;", rf"divdi3.* called by {LINE}: a division: use qm_divud"),
+    ("board_drive.ticks = (uint16_t)(100u / board_drive.ticks);", "", rf"{LINE} divides by a variable"),
+    ("spoil_ram[board_drive.ticks & 255u] = 1;", "static volatile int16_t spoil_ram[256];", "RAM: [0-9]+ bytes of a budget of [0-9]+"),
+    ("board_drive.ticks = spoil_flash[board_drive.ticks & 255u];",
+     "extern const uint16_t spoil_flash[256];\nconst uint16_t spoil_flash[256] = { 1 };",
+     "flash: [0-9]+ bytes of a budget of [0-9]+"),
+    ("deep();", DEEP, "stack: up to [0-9]+ bytes of [0-9]+"))
 
 
 @needs_compiler
-@pytest.mark.parametrize("body, before, told", [
-    ("spoil_a = (int32_t)((float)spoil_b * 1.5F);", NUMBERS, r"called by firmware_background\(\) \(firmware/board/firmware.c, line [0-9]+\): a float: use a Q format"),
-    ("spoil_a = spoil_a / spoil_b;", NUMBERS, r"called by firmware_background\(\) \(firmware/board/firmware.c, line [0-9]+\): a division: use qm_divud"),
-    ("spoil_c = spoil_c / board_drive.ticks;", "static volatile int64_t spoil_c;",
-     r"called by firmware_background\(\) \(firmware/board/firmware.c, line [0-9]+\): a division: use qm_divud"),
-    ("board_drive.ticks = (uint16_t)(100u / board_drive.ticks);", "", r"firmware_background\(\) \(firmware/board/firmware.c, line [0-9]+\) divides by a variable"),
-    ("spoil_ram[board_drive.ticks & 255u] = 1;", "static volatile int16_t spoil_ram[256];", "RAM: [0-9]+ bytes of a budget of [0-9]+"),
-    ("board_drive.ticks = spoil_flash[board_drive.ticks & 2047u];",
-     "extern const uint16_t spoil_flash[2048];\nconst uint16_t spoil_flash[2048] = { 1 };",
-     "flash: [0-9]+ bytes of a budget of [0-9]+"),
-    ("spoil(board_drive.ticks);", RECURSIVE, "stack: recursion: spoil -> spoil"),
-    ("spoil_pointer();", "extern void (*volatile spoil_pointer)(void);\nvoid (*volatile spoil_pointer)(void) = pwm_init;",
-     r"stack: \w+: call through a pointer at 0x[0-9a-f]+, firmware_background\(\) of firmware/board/firmware.c"),
-    ("spoil();", DEEP, "stack: up to [0-9]+ bytes of [0-9]+")])
-def test_code_that_fails_the_build_is_told_with_its_place(tree, body, before, told):
-    assert re.search(told, " ".join(tree.spoil("firmware/board/firmware.c", HEAD, f"{before}\n{HEAD}    {body}\n").splitlines()))
+@pytest.mark.parametrize("mistakes", [NOT_CALCULABLE, TOO_MUCH], ids=["not calculable", "too much"])
+def test_code_that_fails_the_build_is_told_with_its_place(tree, mistakes):
+    bodies, before, told = zip(*mistakes)
+    said = tree.spoil("firmware/board/firmware.c", HEAD, "\n".join([*before, HEAD, *bodies, ""]))
+    assert [line for line in told if not re.search(line, said)] == [], said
 
 
 CONFIGURATION = (("FWDTEN = ON", "FWDTEN = OFF", "ON"), ("WDTPOST = PS16", "WDTPOST = PS32768", "PS16"), ("WDTPRE = PR32", "WDTPRE = PR128", "PR32"),
@@ -202,8 +205,6 @@ CONFIGURATION = (("FWDTEN = ON", "FWDTEN = OFF", "ON"), ("WDTPOST = PS16", "WDTP
 
 @needs_compiler
 @pytest.mark.parametrize("file, old, new, told", [
-    ("isr.c", "void BOARD_ISR _MathError(void) ", "void BOARD_ISR _T3Interrupt(void) ",
-     "the image has no _MathError"),
     ("main.c", "int main(void)\n{", "int main(void)\n{\n    int unused = 1;", "unused variable"),
     ("main.c", "int main(void)\n{", "void nowhere(void);\nint main(void)\n{\n    nowhere();",
      "foc33: the image does not link: undefined reference to `_nowhere' (more in build/target/foc33.memory)")])
@@ -212,18 +213,25 @@ def test_a_mistake_in_the_boards_files_fails_the_build(tree, file, old, new, tol
 
 
 @needs_compiler
-def test_each_configuration_bit_that_the_board_does_not_bear_is_told(tree):
+def test_each_configuration_bit_that_the_board_does_not_bear_and_a_trap_that_is_not_served_are_told(tree):
+    tree.change("firmware/board/isr.c", "void BOARD_ISR _MathError(void) ", "void BOARD_ISR _T3Interrupt(void) ")
     for old, new, _ in CONFIGURATION[1:]:
         tree.change("firmware/board/main.c", old, new)
     told = tree.spoil("firmware/board/main.c", *CONFIGURATION[0][:2])
+    assert "the image has no _MathError" in told
     assert [wrong for _, wrong, right in CONFIGURATION if f"{wrong} in main.c, but the board needs {right}" not in told] == []
 
 
 @needs_compiler
-def test_a_mode_in_userparams_h_is_not_held_to_the_budget_of_the_delivered_drive(tree):
-    tree.change("userparams.h", "/* #define IDENTIFY */", "#define IDENTIFY")
-    done = make("firmware", root=tree.root)
-    assert (done.returncode, warnings(done.stderr)) == (0, []) and "of 33024 bytes of the chip" in done.stdout
+@pytest.mark.parametrize("old, new, budget", [("", "", r"--budget firmware/budget\.toml *--wcet"),
+                                              ("/* #define IDENTIFY */", "#define IDENTIFY", r"foc33\.map --objdump \S+ *--wcet"),
+                                              ("#define SCOPE 0 ", "#define SCOPE 1 ", r"--budget firmware/budget\.toml --other-header --wcet")])
+def test_a_mode_in_userparams_h_is_not_held_to_the_budget_of_the_delivered_drive(tmp_path, old, new, budget):
+    text = (ROOT / "userparams.h").read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "userparams.h").write_text(text.replace(old, new), encoding="utf-8")
+    done = make("-n", "build/target-unbuilt/checked", "VARIANT=unbuilt", f"USERPARAMS={tmp_path}")
+    assert re.search(budget, done.stdout), done.stdout[-2000:]
 
 
 @needs_compiler

@@ -7,6 +7,6 @@ $T/made/image/test_figures: $B/libpil.so
 $T/made/image/test_units: $$X/test/liblaw.a $$(target_test_simulator) $$(addprefix $$T/,$$(law_tests))
 
 .PHONY: test-image
-test-image: export PYTEST_ADDOPTS := -m xc16
+test-image: export PYTEST_ADDOPTS := -m "xc16 and not release"
 test-image: setup-test find-xc16 ## [tests] what needs XC16: every mode, size, cycles, longest path, pil, tests of the image [ONLY="test_modes ..."]
 	$(call run_suites,$(image_suites))
