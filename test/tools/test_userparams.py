@@ -75,13 +75,12 @@ def place(text: str, name: str) -> str:
 
 NUMBER = f"write one, {range_of('MOTOR_RS_OHM')}, with a decimal point and without a unit"
 RS = line_of("MOTOR_RS_OHM")
+DECIMALS = {name: number for name, number in re.findall(r"^#define (\w+) (\d+\.\d+)\b", HEADER, re.MULTILINE) if name in parameters()}
 MODE = "/* #define TUNING */"
 assert MODE in HEADER
 # What is typed, the parameter it is about, and what the build and the compiler say of it.
 MISTAKES = {
-    **{f"no number {text}": (value("MOTOR_RS_OHM", text), "MOTOR_RS_OHM", f"MOTOR_RS_OHM = {text} is no number: {NUMBER}") for text in (
-        "2,67", "(2,67)", "two", '"2.67"', "'2'", "2.67 ohm", "2.67ohm", "= 2.67",
-        "-two", "[2.67]", "2.67 1", "24V", "(24 V)", "2.67\N{GREEK CAPITAL LETTER OMEGA}")},
+    **{f"no number {text}": (value("MOTOR_RS_OHM", text), "MOTOR_RS_OHM", f"MOTOR_RS_OHM = {text} is no number: {NUMBER}") for text in ("2,67", "(24 V)")},
     "a comma within the range": (value("MOTOR_KPHI_V_PER_KRPM", "7,24"), "MOTOR_KPHI_V_PER_KRPM",
                                  f"MOTOR_KPHI_V_PER_KRPM = 7,24 is no number: write one, {range_of('MOTOR_KPHI_V_PER_KRPM')}"),
     "a gain that is no number": (HEADER.replace(RS, RS + "#define SPEEDCNTR_PTERM 0,1\n"), "SPEEDCNTR_PTERM",
@@ -127,11 +126,12 @@ MISTAKES = {
 }
 
 
-def sampled(names) -> list:
-    """Each name with the PC's compiler and every sixth with the chip's: its build calls four compilations, and the words are those of one script."""
+def sampled(names, of_pc: int = 1) -> list:
+    """Each name, or each of so many, with the PC's compiler and every sixth with the chip's: its build calls four compilations, and the words are those
+    of one script."""
     pc, *others = COMPILERS
     names = list(names)
-    every = [(name, pc) for name in names] + [(name, other) for name in names[::6] for other in others]
+    every = [(name, pc) for name in names[::of_pc]] + [(name, other) for name in names[::6] for other in others]
     return [pytest.param(name, *compiler.values, id=f"{name}-{compiler.id}", marks=compiler.marks) for name, compiler in every]
 
 
@@ -143,10 +143,23 @@ def test_a_mistake_is_one_line_of_the_build_with_its_place(tmp_path, mistake, co
     assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: {where}: {told}"), lines
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("mistake", MISTAKES)
+# The build's words are those of this compilation.
+@pytest.mark.parametrize("mistake, compiler", sampled(MISTAKES, 3))
 def test_the_compiler_alone_says_the_same_first(tmp_path, mistake, compiler):
     assert f": userparams.h: {MISTAKES[mistake][2]}" in compiled(tmp_path, compiler, MISTAKES[mistake][0])
+
+
+NO_NUMBERS = ("(2,67)", "two", '"2.67"', "'2'", "2.67 ohm", "2.67ohm", "= 2.67", "-two", "[2.67]", "2.67 1", "24V", "2.67\N{GREEK CAPITAL LETTER OMEGA}")
+
+
+def test_whatever_is_no_number_is_a_line_each(tmp_path):
+    wrong, text = dict(zip(DECIMALS, NO_NUMBERS, strict=False)), HEADER
+    for name, number in wrong.items():
+        text = text.replace(line_of(name), f"#define {name} {number}\n")
+    code, lines = checked(tmp_path, PC, text)
+    assert code == 2 and len(lines) == len(wrong) == len(NO_NUMBERS), lines
+    for name, number in wrong.items():
+        assert sum(line.startswith(f"foc33: {place(text, name)}: {name} = {number} is no number: write one, {range_of(name)}") for line in lines) == 1, (name, lines)
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -275,8 +288,7 @@ NAMES = {
 }
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("mistake", NAMES)
+@pytest.mark.parametrize("mistake, compiler", sampled(NAMES))
 def test_a_name_that_cannot_be_meant_is_one_line_with_its_place(tmp_path, mistake, compiler):
     text, told = NAMES[mistake]
     code, lines = checked(tmp_path, compiler, text)
@@ -322,12 +334,21 @@ def test_a_header_in_utf_16_is_called_so(tmp_path, encoding):
 
 
 # ---- what C allows -------------------------------------------------------------------------------------------------------
+FORMS_OF_ONE = ("{0}f", "{0}F", "({0})", "{0}e0", "({0} / 1)", "(float){0}", "(float)({0} / 1)", "{0} /* a comment, with a comma */", "{0} // and one",
+                "{0} \\\n", "+{0}", "(1 ? {0} : 3)", "({0} > 0) * {0}", "((1.0) * ({0}))", "2*{0}/2", "0{0}", "(0 + {0})")
+
+
+def many_forms(turn: int) -> str:
+    """Every decimal number of the header in another form, so that in all turns each form has been at several."""
+    text = HEADER
+    for at, (name, number) in enumerate(DECIMALS.items()):
+        text = text.replace(line_of(name), f"#define {name} {FORMS_OF_ONE[(at + turn) % len(FORMS_OF_ONE)].format(number)}\n")
+    return text
+
+
 LEGAL = {
-    "as it is": HEADER,
-    **{f"MOTOR_RS_OHM {text}": value("MOTOR_RS_OHM", text) for text in (
-        "2.67f", "2.67F", "(2.67)", "267e-2", ".5", "3.", "3", "0x3", "3u", "(5.34 / 2)", "5.34/2.", "(float)2.67", "(float)(5.34 / 2)",
-        "2.67 /* a comment, with a comma */", "2.67 // and one", "2.67 \\\n", "+2.67", "(1 ? 2.67 : 3)", "(2.67 > 0) * 2.67",
-        "((2.0) + (0.67))", "2*1.335", "1.0*5/2", "6/2", "5/2.", "0.267e1", "00.5", "(0 + 2.67)")},
+    "as it is": HEADER, **{f"many forms, {turn}": many_forms(turn) for turn in (0, 9)},
+    **{f"MOTOR_RS_OHM {text}": value("MOTOR_RS_OHM", text) for text in (".5", "3.", "3", "0x3", "3u", "5.34/2.", "1.0*5/2", "6/2", "5/2.")},
     "a whole quotient of counts": value("SNAPDELAY", "10/2"),
     "gains of two signs, on purpose": value("KCURRB", "0.5") + "#define KCURR_SIGNS_DIFFER\n",
     "a share of 1/Kphi": value("INVKFI_SPEED3", "(NORM_INVKFIBASE * 1.1)"),
@@ -357,8 +378,7 @@ def test_what_c_allows_is_not_refused(tmp_path, style, compiler):
     assert checked(tmp_path, compiler, LEGAL[style]) == (0, [])
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("style", LEGAL)
+@pytest.mark.parametrize("style, compiler", sampled(LEGAL, 3))
 def test_what_c_allows_is_not_refused_by_the_compiler_alone(tmp_path, style, compiler):
     (tmp_path / "more.h").write_text(RS, encoding="utf-8")
     assert compiled(tmp_path, compiler, LEGAL[style]) == ""
