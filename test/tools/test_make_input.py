@@ -22,9 +22,13 @@ HELP = re.findall(r"^  make (\S+) .*?((?: \[.*\])?)$", make().stdout, re.MULTILI
 MODES = [mode for mode in modes() if mode not in ("BRINGUP", "IDENTIFY", "PARAMS_IN_RAM", "SELFTEST_OFF")]
 
 
+COMPILED = ("build/board", "build/iss")
+"""Of the board alone, no file of the firmware: half a minute of each copy's first build."""
+
+
 def copy(root: Path) -> Path:
-    """The project, not built yet."""
-    for name in SOURCES:
+    """The project, its firmware not built yet."""
+    for name in (*SOURCES, *(name for name in COMPILED if (ROOT / name).exists())):
         source, target = ROOT / name, root / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__", ".*")) if source.is_dir() else shutil.copy(source, target)

@@ -49,7 +49,7 @@ def test_two_makes_do_not_compile_at_the_same_time(tree, tmp_path):
     (tmp_path / "busy").mkdir()
     (tmp_path / "cc").write_text(WATCHING, encoding="utf-8")
     (tmp_path / "cc").chmod(0o755)
-    done = together(tree, *([goal, f"CC={shlex.quote(str(tmp_path))}/cc {goal}"] for goal in ("lib", "vboard")), BUSY=str(tmp_path / "busy"))
+    done = together(tree, *(["lib", f"CC={shlex.quote(str(tmp_path))}/cc {maker}"] for maker in ("one", "two")), BUSY=str(tmp_path / "busy"))
     assert [item.returncode for item in done] == [0, 0], [item.stdout + item.stderr for item in done]
     assert (tmp_path / "busy.overlaps").read_text(encoding="utf-8") == ""
 
