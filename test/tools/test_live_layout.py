@@ -11,7 +11,9 @@ from tools.live import page as page_text
 from tools.live import view
 from tools.live.real_board import SILENT_S, RealBoard
 
-WIDTHS = [360, 390, 500, 720, 768, 900, 1000, 1280, 1400, 1800, 2560]
+RELEASE = (390, 500, 768, 1400, 2560)
+"""On each push one of each of page.css's layouts."""
+WIDTHS = [pytest.param(width, marks=[pytest.mark.release] * (width in RELEASE)) for width in (360, 390, 500, 720, 768, 900, 1000, 1280, 1400, 1800, 2560)]
 CURVE_PX = 300
 CONTROLS = "button, select, input, summary, a[href], .push, #pot, [tabindex='0']"
 PLACES = f"""[...document.querySelectorAll("{CONTROLS}")].filter((e) => e.getClientRects().length).map((e) => {{
