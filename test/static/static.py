@@ -146,6 +146,18 @@ def cover(texts: dict[tuple[str, ...], frozenset]) -> list[tuple[str, ...]]:
     return chosen
 
 
+def parts(name: str, texts: dict[tuple[str, ...], frozenset]) -> list[tuple[tuple[str, ...], str, frozenset]]:
+    """The configurations of cover(), each with a unit of the files that have in it lines which none before it had, of the first that is nearly every
+    file; and all lines of these files."""
+    missing, found = frozenset().union(*texts.values()), []
+    for number, configuration in enumerate(cover(texts)):
+        files = {file for file, _, _ in texts[configuration] & missing}
+        missing -= texts[configuration]
+        unit = as_unit(f"{name}_{number}.c", sorted(file for file in files if file.startswith(("firmware/", "include/"))))
+        found.append((configuration, unit, frozenset(line for line in texts[configuration] if line[0] in files and (number == 0 or line[0] != "userparams.h"))))
+    return found
+
+
 def compiler(name: str, command: list[str], jobs: list[tuple[str, list[str]]]) -> list[Finding]:
     """One finding for each message in any mode; these compile clean, so the page has no row for them."""
     findings = set()
@@ -158,8 +170,12 @@ def compiler(name: str, command: list[str], jobs: list[tuple[str, list[str]]]) -
 def one_unit(sources: list[str]) -> str:
     """All sources as one, as the image is compiled: each header is looked at once, not with every source that includes it. Nothing is said of this
     file itself."""
-    unit = BUILD / "unit.c"
-    unit.write_text("".join(f'#include "{source}"\n' for source in sources if source not in (*CHECKS_OF_PARAMETERS, *other_applications())))
+    return as_unit("unit.c", [source for source in sources if source not in (*CHECKS_OF_PARAMETERS, *other_applications())])
+
+
+def as_unit(name: str, files: list[str]) -> str:
+    unit = BUILD / name
+    unit.write_text("".join(f'#include "{file}"\n' for file in files))
     return str(unit)
 
 
@@ -168,18 +184,28 @@ def other_applications() -> list[str]:
     return sorted(str(path) for path in Path("firmware/app").glob("*.c") if path.name != "panel.c")
 
 
-def cppcheck(unit: str, texts: dict[tuple[str, ...], frozenset], sources: list[str]) -> list[Finding]:
-    """Its own checks and those of its MISRA addon, with the target's type sizes: of the unit in configurations that have every line
-    between them, without the parameters' start values, which are most of the text of each; of each file, for some rules read its text only,
-    what is delivered."""
+def cppcheck(unit: str, texts: dict[tuple[str, ...], frozenset], sources: list[str], deviations: list[Deviation]) -> list[Finding]:
+    """Its own checks and those of its MISRA addon, with the target's type sizes: of each file, for some rules read its text only, what is delivered; of the
+    unit in configurations that have every line between them, of each the files with lines of its own, without the parameters' start values, which are most of
+    the text. While something then seems unused, the whole unit is looked at in one more of them."""
     sources = [source for source in sources if source not in CHECKS_OF_PARAMETERS]
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:
         Path(folder, "drive").mkdir()
         Path(folder, "drive", "param_init.h").write_text("#define DRIVE_PARAMS_INIT {0}\n")
-        chosen = cover(texts)
-        jobs = [(["-DANALYSED=1", f"-I{folder}", *defines(configuration)], [unit]) for configuration in chosen]
-        found = each(lambda job: one_cppcheck(*job), [(["--max-configs=1"], sources), *jobs])
-    return sorted(of_all(found, [texts[configuration] for configuration in ((), *chosen)]), key=lambda f: (f.check, f.file, f.line))
+
+        def one(part: tuple[tuple[str, ...], str]) -> set[Finding]:
+            return one_cppcheck(["-DANALYSED=1", f"-I{folder}", *defines(part[0])], [part[1]])
+
+        of = parts("cppcheck", texts)
+        found = [one_cppcheck(["--max-configs=1"], sources), *each(lambda part: one(part[:2]), of)]
+        lines = [texts[()], *(lines for _, _, lines in of)]
+        for configuration in cover(texts)[1:]:
+            if not any(finding.check in UNUSED and not any(row.covers(finding) for row in deviations) for finding in of_all(found, lines)):
+                break
+            found.append(one((configuration, unit)))
+            lines.append(texts[configuration])
+        found = of_all(found, lines)
+    return sorted(found, key=lambda f: (f.check, f.file, f.line))
 
 
 def of_all(found: list[set[Finding]], texts: list[frozenset]) -> set[Finding]:
@@ -188,7 +214,7 @@ def of_all(found: list[set[Finding]], texts: list[frozenset]) -> set[Finding]:
     places = [{line[:2] for line in text} for text in texts]
     return {finding for finding in set().union(*found) if finding.check not in UNUSED
             or finding in found[0] and all(finding in run for run, lines in zip(found, places, strict=True)
-                                         if finding.check == "misra 2.5" or (finding.file, finding.line) in lines)}
+                                         if (finding.check == "misra 2.5" and finding.file in {file for file, _ in lines}) or (finding.file, finding.line) in lines)}
 
 
 def one_cppcheck(options: list[str], sources: list[str]) -> set[Finding]:
@@ -225,8 +251,8 @@ def main() -> int:
     each_line = [(source, defines(configuration)) for source, its in texts.items() for configuration in cover(its)]
     checks_of_parameters = [(source, defines(configuration)) for source in CHECKS_OF_PARAMETERS for configuration in CHECKED]
     checks = {
-        "cppcheck": lambda: cppcheck(unit, distinct(unit, [*configurations(), ON_TARGET]), sources),
-        "clang_tidy": lambda: clang_tidy(each_line),
+        "cppcheck": lambda: cppcheck(unit, distinct(unit, [*configurations(), ON_TARGET]), sources, deviations),
+        "clang_tidy": lambda: clang_tidy([*((file, defines(configuration)) for configuration, file, _ in parts("clang_tidy", texts[unit])), *each_line[-len(other_applications()):]]),
         "clang_16_bit": lambda: compiler("clang", [CLANG, *CLANG_16_BIT, *CLANG_FLAGS], [*each_text, *checks_of_parameters]),
         "gcc": lambda: compiler("gcc", [os.environ.get("CC", "gcc"), *GCC_FLAGS], [*each_line, *checks_of_parameters]),
     }

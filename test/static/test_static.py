@@ -40,6 +40,15 @@ NOT_REACHED = {"ifdef __OPTIMIZE__", "if MOTOR_SALIENCY_UH", "else of ifdef __cl
 """What asks the optimizer; what a salient motor's userparams.h has, or one of AN1292; what is empty."""
 
 
+def test_what_parameters_are_held_to_in_any_mode_is_analysed(monkeypatch) -> None:
+    monkeypatch.chdir(Path(__file__).parents[2])
+    source = static.CHECKS_OF_PARAMETERS[1]
+    rows = re.compile(r"#define MODE_RELATION_\w+\(X\) X\(.*")
+    seen, every = ({line[2] for configuration in of for line in static.preprocessed(source, tuple(static.defines(configuration))) if rows.match(line[2])}
+                   for of in (static.CHECKED, [*static.CHECKED, ("SNAPSHOT",)]))
+    assert len(seen) >= 3 and {re.sub('"[A-Z]+"', "", row) for row in seen} == {re.sub('"[A-Z]+"', "", row) for row in every}
+
+
 def branches(path: Path) -> Iterator[tuple[str, list[int]]]:
     """Each branch of each #if: its condition, and the numbers of its own lines with code."""
     text = re.sub(r"/\*.*?\*/", lambda comment: "\n" * comment[0].count("\n"), path.read_text(encoding="utf-8"), flags=re.DOTALL)
@@ -63,7 +72,7 @@ def test_what_stands_in_any_branch_of_any_if_is_analysed_in_one_of_the_configura
     sources = sorted(map(str, Path("firmware").rglob("*.c")))
     seen, missed = set(), {}
     for source in (static.one_unit(sources), *static.CHECKS_OF_PARAMETERS, *static.other_applications()):
-        texts = static.distinct(source, [*static.configurations(), static.ON_TARGET])
+        texts = static.distinct(source, static.CHECKED if source in static.CHECKS_OF_PARAMETERS else [*static.configurations(), static.ON_TARGET])
         seen |= {line[:2] for configuration in static.cover(texts) for line in texts[configuration]}
     for path in (*Path("include").rglob("*.h"), *Path("firmware").rglob("*.c")):
         for condition, lines in branches(path):
