@@ -21,7 +21,7 @@ INLINE void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     alphabeta_t i = clarke(d->phases_q13.a, d->phases_q13.b), e, v;
     c->i_q13 = park(i, d->frame);
     c->i_q13.q = (int16_t)(c->i_q13.q + c->sample_shift_q13);
-    c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, mode_asked(run), c->i_q13, &d->circle, &c->vq_limit_q14);
+    c->v_q14 = current_control(&c->pi_d, &p->pi_d, &c->pi_q, &p->pi_q, mode_asked(run, p), c->i_q13, &d->circle, &c->vq_limit_q14);
     e = estimator_back_emf(&run->estimator, &p->estimator, &run->model, i);
     if (drive_is_forced(d)) {
         estimator_run_along(&run->estimator, &p->estimator, &run->model, e);

@@ -25,8 +25,8 @@ RECORD = HERE / "proved.txt"
 SPOT_CHECKS = 8 # with --new, one in so many of the recorded proofs runs all the same
 KERNEL = """-machdep gcc_x86_16 -warn-signed-overflow -no-warn-left-shift-negative -kernel-warn-key parser:decimal-float=inactive,annot:missing-spec=abort
     -eva -eva-warn-signed-converted-downcast -eva-no-show-progress -report-unclassified-warning NONE""".split()
-HEADERS = {"LATE": "late_header.h", "EACH": "each_header.h", "EACH_LATE": "each_late_header.h"}
-"""Modes that are a header: with the shortest period, whose duties are late; with dead time's compensation for each pulse."""
+HEADERS = {"SCOPED": "scoped_header.h", "LATE": "late_header.h", "EACH": "each_header.h", "EACH_LATE": "each_late_header.h"}
+"""Modes that are a header: with the scope, and any sine beside the current; with the shortest period, whose duties are late; with dead time's compensation for each pulse."""
 PROVED = {"Valid", "Considered valid", "Valid under hypotheses", "Dead"}
 
 

@@ -1,6 +1,6 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
- * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING LATE EACH EACH_LATE
+ * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING SCOPED LATE EACH EACH_LATE
  * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between,fieldweak_between,held_sum
  *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
@@ -268,6 +268,13 @@ static void any_state(uint16_t state)
     any_drive(state);
     any_estimator(&drive.run.estimator);
     any_control(&drive.run.control);
+#if SCOPE
+    drive.run.sine.left = ANYU16();
+    drive.run.sine.step = ANYU16();
+    drive.run.sine.angle = ANYU16();
+    drive.run.sine.size_q = ANY16();
+    drive.run.sine.size_rho_q17 = ANY16();
+#endif
     drive.run.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
     any_observer_state(&drive.run.observer);
     any_adaptation(&drive.run.adaptation);

@@ -18,47 +18,47 @@ void setUp(void)
     drive.run.control.ref_q13.q = 1200;
     SINE->angle = 5000;
     SINE->step = 3000;
-    SINE->size_d = 8000;
     SINE->size_q = -4000;
     SINE->size_rho_q17 = 2000;
 }
 
 void test_references_and_angle_are_as_they_are_without_a_sine(void)
 {
-    dq_t asked = mode_asked(&drive.run);
+    dq_t asked = mode_asked(&drive.run, &params);
     TEST_ASSERT_EQUAL_INT16(-300, asked.d);
     TEST_ASSERT_EQUAL_INT16(1200, asked.q);
     TEST_ASSERT_EQUAL_UINT32(drive.run.estimator.rho_q32, mode_observed(&drive.run));
     TEST_ASSERT_EQUAL_UINT16(5000, SINE->angle);
 }
 
-void test_each_period_has_the_next_value_beside_both_currents_an_eighth_of_a_count_a_unit(void)
+void test_each_period_has_the_next_value_beside_the_q_current_an_eighth_of_a_count_a_unit(void)
 {
     uint16_t n;
     SINE->left = 1;
     for (n = 1; n <= 60u; n++) {
-        const dq_t asked = mode_asked(&drive.run);
+        const dq_t asked = mode_asked(&drive.run, &params);
         const double sine = sin(TURN * (uint16_t)(5000u + n * 3000u) / 65536.0);
         TEST_ASSERT_EQUAL_UINT16((uint16_t)(5000u + n * 3000u), SINE->angle);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, lround(-300.0 + 1000.0 * sine), asked.d, golden_row(n));
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(1, lround(1200.0 - 500.0 * sine), asked.q, golden_row(n));
+        TEST_ASSERT_EQUAL_INT16(-300, asked.d);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(1 + 500 / 40, lround(1200.0 - 500.0 * sine), asked.q, golden_row(n));
     }
 }
 
-void test_largest_sine_is_half_of_full_scale_and_never_wraps_the_controllers_error(void)
+void test_reference_and_sine_stay_within_the_largest_current(void)
 {
-    uint16_t n;
-    SINE->left = 1;
-    SINE->step = 256;
-    SINE->size_d = 32767;
-    SINE->size_q = -32768;
-    drive.run.control.ref_q13.d = params.current_max_q13;
-    drive.run.control.ref_q13.q = (int16_t)-params.current_max_q13;
-    for (n = 0; n < 256u; n++) {
-        const dq_t asked = mode_asked(&drive.run);
-        TEST_ASSERT_INT16_WITHIN(4096, params.current_max_q13, asked.d);
-        TEST_ASSERT_INT16_WITHIN(4096, -params.current_max_q13, asked.q);
-        TEST_ASSERT_LESS_THAN_INT32(32767 - 16384, (asked.d > 0) ? asked.d : -asked.d);
+    EACH_DIRECTION(direction) {
+        uint16_t n;
+        int16_t most = 0;
+        SINE->left = 1;
+        SINE->step = 256;
+        SINE->size_q = 32767;
+        drive.run.control.ref_q13.q = (int16_t)(direction * (params.current_max_q13 - 100));
+        for (n = 0; n < 256u; n++) {
+            const int16_t asked = (int16_t)(direction * mode_asked(&drive.run, &params).q);
+            most = (asked > most) ? asked : most;
+            TEST_ASSERT_INT16_WITHIN(4097, params.current_max_q13 - 100, asked);
+        }
+        TEST_ASSERT_EQUAL_INT16(params.current_max_q13, most);
     }
 }
 
@@ -102,16 +102,15 @@ void test_controllers_follow_the_currents_with_the_sine(void)
 {
     int16_t without, with;
     rig_tick(1);
-    without = drive.run.control.v_q14.d;
+    without = drive.run.control.v_q14.q;
     rig_closed(1, 8000);
-    SINE->size_d = 8000;
-    SINE->size_q = 0;
+    SINE->size_q = -8000;
     SINE->angle = 16384;
     SINE->step = 0;
     SINE->left = 2;
     rig_tick(1);
-    with = drive.run.control.v_q14.d;
-    TEST_ASSERT_GREATER_THAN_INT16(without + 500, with);
+    with = drive.run.control.v_q14.q;
+    TEST_ASSERT_LESS_THAN_INT16(without - 500, with);
 }
 
 void test_sine_ends_after_so_many_slow_steps_whatever_the_state(void)
@@ -122,7 +121,6 @@ void test_sine_ends_after_so_many_slow_steps_whatever_the_state(void)
         rig_closed(1, 8000);
         drive.state = (uint16_t)states[n];
         drive.ticks = 0;
-        SINE->size_d = 0;
         SINE->size_q = 0;
         SINE->size_rho_q17 = 0;
         SINE->left = 3;

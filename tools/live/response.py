@@ -153,7 +153,7 @@ class Bench:
         step = max(1, round(hz * self.period_s * TURN))
         self.firmware.put(f"{SINE}.left", 0)
         self.firmware.put(f"{SINE}.step", step)
-        for name in ("size_d", "size_q", "size_rho_q17"):
+        for name in ("size_q", "size_rho_q17"):
             self.firmware.put(f"{SINE}.{name}", sizes.get(name, 0))
         self.firmware.put(f"{SINE}.left", min(65535, math.ceil(seconds / (SLOW_PERIODS * self.period_s))))
         return step / TURN / self.period_s

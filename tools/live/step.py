@@ -69,7 +69,7 @@ def current(bench: Bench) -> tuple[np.ndarray, np.ndarray]:
     """Times since the step, and the q current as a share of it."""
     firmware, names = bench.firmware, [f"{SINE}.left", f"{RUN}.control.i_q13.q", f"{RUN}.control.ref_q13.q", f"{RUN}.control.i_q13.d"]
     size, records = round(8.0 * CURRENT_SHARE * bench.params["MAXIMUM_CURRENT_A"] / bench.params["COUNT_CURRENT_A"]), []
-    for name, value in (("left", 0), ("step", 0), ("angle", QUARTER), ("size_d", 0), ("size_q", size), ("size_rho_q17", 0)):
+    for name, value in (("left", 0), ("step", 0), ("angle", QUARTER), ("size_q", size), ("size_rho_q17", 0)):
         firmware.put(f"{SINE}.{name}", value)
     left = firmware.of(f"{SINE}.left")
     rows = firmware.link.scope_state().size // (2 * len(names))

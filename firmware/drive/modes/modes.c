@@ -171,18 +171,27 @@ uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t 
 #endif
 }
 
-INLINE QM_WRAPS dq_t mode_asked(drive_run_t *run)
+#if SCOPE
+/** The sine of the nearest 128th of a turn, within 0.025: a client knows the angle itself. */
+static INLINE q15_t sine_coarse(angle_t angle)
+{
+    const uint16_t nearest = (uint16_t)(angle + 256u);
+    const q15_t s = trig_sin_table[(uint16_t)(nearest >> 9) & (TRIG_SIN_ENTRIES - 1u)];
+    return (int16_t)((nearest & 0x8000u) ? -s : s);
+}
+#endif
+
+INLINE QM_WRAPS dq_t mode_asked(drive_run_t *run, const drive_params_t *p)
 {
     dq_t asked = run->control.ref_q13;
 #if SCOPE
     sine_t *s = &run->sine;
     if (s->left != 0u) {
-        int16_t sine;
         s->angle = (angle_t)(s->angle + s->step);
-        sine = (int16_t)(trig_sincos(s->angle).sin >> 2);
-        asked.d = (int16_t)(asked.d + qm_mulhi(s->size_d, sine));
-        asked.q = (int16_t)(asked.q + qm_mulhi(s->size_q, sine));
+        asked.q = qm_limit((int16_t)(asked.q + (qm_mulhi(s->size_q, sine_coarse(s->angle)) >> 2)), p->current_max_q13);
     }
+#else
+    (void)p;
 #endif
     return asked;
 }

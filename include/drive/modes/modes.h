@@ -48,13 +48,12 @@ void mode_start(drive_t *d, const drive_params_t *p);
 /* A sine that a client on the serial line adds to measure the loops (make response, docs/response.md); it ends by itself, and with the run.
  * The current loops are opened at their reference, the speed loop where the load observer gets its angle. */
 #if SCOPE
-/** The sine: the client writes `left` last, and the three sizes within what the loops carry. */
+/** The sine: the client writes `left` last, and sizes within what the loops carry. */
 typedef struct {
     uint16_t left;        /**< slow steps until it ends, of SLOW_PERIODS; 0: there is none */
     angle_t step;         /**< of a period, 65536 = one turn */
     angle_t angle;        /**< in this period */
-    int16_t size_d;       /**< peak beside the d current asked for, an eighth of a count of Q13: at most half of full scale */
-    int16_t size_q;       /**< and beside the q current */
+    int16_t size_q;       /**< peak beside the q current asked for, an eighth of a count of Q13; both together stay within the largest current */
     int16_t size_rho_q17; /**< peak beside the estimator's angle, turns: at most a quarter */
 } sine_t;
 #define SINE_STATE sine_t sine;
@@ -131,7 +130,7 @@ uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t 
 /* ---- SCOPE: the sine that measures the loops ---- */
 
 /** The currents that the controllers are asked for in this period: the references, and the sine's next value. */
-dq_t mode_asked(drive_run_t *run);
+dq_t mode_asked(drive_run_t *run, const drive_params_t *p);
 
 /** A slow step of the sine's time. */
 void mode_sine_step(drive_run_t *run);
