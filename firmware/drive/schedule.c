@@ -124,14 +124,15 @@ static void choose_state(drive_t *d, const drive_params_t *p, const drive_sample
     speed_choose_state(d, p);
 }
 
-/* wcet: speed_load_moves_against excludes trim_speed/speed_follow */
+/* wcet: speed_load_moves_against excludes trim_speed/speed_schedule */
 /** The speed's error at rest; stall and lost lock. While the innovation gate is open the gains follow here, too, and the trim does not look at the load's way. */
 static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
+    (void)raw;
     speed_trim_step(d, p);
     protection_check_rotor(d, p);
     if (!observer_gate_is_closed(&d->run.observer)) {
-        follow_speed(d, p, raw);
+        speed_schedule(&d->run, p);
     }
 }
 

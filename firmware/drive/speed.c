@@ -52,9 +52,6 @@ void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;
     int16_t gain, reference = qm_abs(run->control.reference_erpm), speed = qm_abs(observer_speed(o));
-    if (qm_mulss(run->control.ref_q13.q, observer_speed(o)) < 0) {
-        observer_raise_gate(o); /* where the current crosses zero, dead time's voltage is all that is known of the back-EMF: no load is */
-    }
     observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, (int16_t)(run->control.ref_q13.q - mode_profile_current(run)));
     gain = observer_between(p->speed_kp_q13, p->speed_kp_fast_q13, o->fast_share_q15);
     run->control.speed_kp_q13 = observer_between(0, gain, observer_twice(o->share_q15)); /* at low speed a light rotor needs it more than the rates */

@@ -615,6 +615,35 @@ void test_unrest_of_the_hand_over_lasts_until_its_d_current_is_gone(void)
     TEST_ASSERT_EQUAL_UINT16(OBSERVER_GATE_AT_START + 98, drive.run.observer.gate_level);
 }
 
+/** Where the current crosses zero the back-EMF is known to dead time's voltage only, and an estimate that dips there is no load. */
+void test_current_that_brakes_lets_the_gate_take_as_little_for_a_load_as_at_the_hand_over(void)
+{
+    const struct {
+        int16_t speed_erpm, current_q13;
+        uint16_t level, then;
+    } cases[] = {
+        { 8000, -1, 0, OBSERVER_GATE_AT_START }, { -8000, 1, 0, OBSERVER_GATE_AT_START }, { 8000, -3000, 7, OBSERVER_GATE_AT_START },
+        { 8000, 0, 7, 6 }, { -8000, 0, 7, 6 }, { -8000, -1, 7, 6 }, { 8000, 3000, 7, 6 },
+        { 8000, -3000, OBSERVER_GATE_AT_START + 9, OBSERVER_GATE_AT_START + 8 }, /* more unrest fades as it does */
+    };
+    EACH(n, cases) {
+        observer_t *o = &drive.run.observer;
+        rig_closed(1, cases[n].speed_erpm);
+        drive.run.handover.phase = (uint16_t)START_DONE;
+        drive.run.handover.offset = 0;
+        drive.run.control.ref_q13.q = cases[n].current_q13;
+        drive.run.control.i_q13.q = 0;
+        o->load_q16 = 0;
+        o->rate_q16 = 0;
+        o->fast_share_q15 = 0;
+        o->gate_erpm = 32767;
+        o->gate_level = cases[n].level;
+        o->omega_q16 = (int32_t)cases[n].speed_erpm * 65536;
+        handover_observe(&drive.run, &params);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].then, o->gate_level, golden_row(n));
+    }
+}
+
 void test_current_follows_its_offset(void)
 {
     EACH_DIRECTION(direction) { /* d = -Iq sin(offset), at 45 degrees after the step */

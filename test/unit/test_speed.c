@@ -329,34 +329,6 @@ void test_gain_follows_reference_or_speed_whichever_is_more_and_rises_after_a_la
     TEST_ASSERT_GREATER_THAN_INT16(kp + kp / 2, quick);
 }
 
-void test_current_that_brakes_lets_the_gate_take_as_little_for_a_load_as_at_the_hand_over(void)
-{
-    const struct {
-        int16_t speed_erpm, current_q13;
-        uint16_t level, then;
-    } cases[] = {
-        { 8000, -1, 0, OBSERVER_GATE_AT_START }, { -8000, 1, 0, OBSERVER_GATE_AT_START }, { 8000, -3000, 7, OBSERVER_GATE_AT_START },
-        { 8000, 0, 7, 7 }, { -8000, 0, 7, 7 }, { -8000, -1, 7, 7 }, { 8000, 3000, 7, 7 },
-        { 8000, -3000, OBSERVER_GATE_AT_START + 9, OBSERVER_GATE_AT_START + 9 }, /* more unrest stays */
-    };
-    EACH(n, cases) {
-        int16_t calm_erpm;
-        rig_closed(1, 8000);
-        rig_speed(cases[n].speed_erpm);
-        drive.run.control.ref_q13.q = 0;
-        drive.run.observer.gate_level = 0;
-        speed_schedule(&drive.run, &params);
-        calm_erpm = drive.run.observer.gate_erpm;
-        drive.run.control.ref_q13.q = cases[n].current_q13;
-        drive.run.observer.gate_level = cases[n].level;
-        speed_schedule(&drive.run, &params);
-        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].then, drive.run.observer.gate_level, golden_row(n));
-        if (cases[n].then >= OBSERVER_GATE_AT_START && qm_abs(cases[n].current_q13) == 1) {
-            TEST_ASSERT_EQUAL_INT16_MESSAGE(observer_gate(calm_erpm, OBSERVER_GATE_AT_START), drive.run.observer.gate_erpm, golden_row(n));
-        }
-    }
-}
-
 void test_stop_never_asks_for_a_speed_without_a_gain(void)
 {
     EACH_DIRECTION(direction) {
@@ -401,8 +373,7 @@ static uint16_t rates_come(uint16_t part, int16_t faster_erpm)
     drive.run.control.speed_kp_q13 = 0;
     drive.run.estimator.rho_q32 = drive.run.observer.rho_q32 + 8u * (uint32_t)qm_mulss((int16_t)(observer_speed(&drive.run.observer) + faster_erpm), params.observer.deltat_q32);
     rig_slow(part);
-    TEST_ASSERT_EQUAL_INT16(drive.run.control.sample_shift_q13 > 0, drive.run.control.speed_kp_q13 > 0);
-    return (uint16_t)(drive.run.control.sample_shift_q13 > 0);
+    return (uint16_t)(drive.run.control.speed_kp_q13 > 0);
 }
 
 void test_schedule_of_the_speed_comes_every_sixteenth_period_in_closed_loop_only(void)
