@@ -54,7 +54,7 @@ def test_a_loop_that_is_not_the_models_is_marked_and_the_command_fails(tmp_path)
     (("--loop", "sped"), "invalid choice: 'sped'"),
     (("--loop", "speed", "--speed", "20"), "instead of 20 after 20 s, response: name a speed that it reaches"),
     (("--loop", "speed", "--defines=-DSCOPE=0"), "the firmware has no sine for its loops, response: build it with SCOPE 1"),
-    (("--port", "/dev/none"), "cannot open the port")])
+    (("--port", "/dev/none", "--elf", "build/host-scope-1/foc33.elf"), "cannot open the port")])
 def test_what_cannot_be_measured_is_told_in_one_line(tmp_path, arguments, says):
     done = run("--out", str(tmp_path / "result"), *arguments)
     told = [line for line in done.stderr.splitlines() if line.startswith("foc33: ")]

@@ -5,14 +5,13 @@
 import argparse
 import contextlib
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tools.bench import build, command_common, pil, simulate
+from tools.bench import build, command_common
 from tools.bench.board import Board, Library
 from tools.bench.plots import plt, saved
 from tools.bench.report import clean
@@ -25,15 +24,14 @@ from tuning import loops
 
 from . import board as live_board
 from . import lnet, response, step
-from .response import Bench, Firmware, Point
+from .response import Bench, Driven, Firmware, Point
+from .response_model import COLUMNS, WITHIN_DEG, Result, gains_of, model_of, plants
 from .symbols import Symbols
 
 OPEN_LOOP = "-DOPEN_LOOP_FUNCTIONING"
 SPEED_SHARE, LOAD_SHARE = 0.5, 0.4
 """Of the rated speed and torque, where nobody names them: the current is clear of what dead time loses."""
 SETTLE_S = 2.0
-WITHIN_DEG = 3.0
-"""Between the margin that is measured and the model's."""
 ANSWER_S = 20.0
 """The simulated chip takes its time."""
 CURRENT_STEPS, SPEED_STEPS = 2048, 16384
@@ -42,60 +40,7 @@ STEP_BANDWIDTHS = 8.0
 """A speed's record, over its bandwidth."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """A loop as it was measured, and the model of it at the same frequencies."""
-
-    loop: str
-    points: list[Point]
-    model: np.ndarray
-    speed_rpm: float
-    load_nm: float | None
-    measured: loops.Margins
-    expected: loops.Margins
-
-    @property
-    def difference_deg(self) -> float:
-        return self.measured.phase_deg - self.expected.phase_deg
-
-    @property
-    def holds(self) -> bool:
-        return abs(self.difference_deg) <= WITHIN_DEG
-
-
-# ---- the tuner's model, with what the firmware uses at this moment ---------------------------------------------------------
-
-def plants(params: dict[str, float], motor: motor_file.Motor | None) -> tuple[loops.Plant, loops.Plant]:
-    """The motor, and what the header says of it; without a motor file both are the header's."""
-    pairs, lq = int(params["NOPOLESPAIRS"]), 1e-3 * params["MOTOR_LS_MH"]
-    psi = params["MOTOR_KPHI_V_PER_KRPM"] / (1000.0 * np.pi / 30.0 * pairs * np.sqrt(3.0))
-    header = loops.Plant(params["MOTOR_RS_OHM"], lq - 1e-6 * params["MOTOR_SALIENCY_UH"], lq, psi, pairs, params["MOTOR_INERTIA_KGM2"])
-    if motor is None:
-        return header, header
-    return loops.Plant(motor.rs_ohm, motor.ld_h, motor.lq_h, motor.psi_vs, motor.pole_pairs, motor.inertia_kgm2 + motor.load_inertia_kgm2,
-                       motor.viscous_nms), header
-
-
-def model_of(loop: str, bench: Bench, motor: motor_file.Motor | None) -> Callable[[np.ndarray], np.ndarray]:
-    """The open loop over the frequency. Gains that follow the speed are read from the firmware."""
-    true, header = plants(bench.params, motor)
-    gains, omega_e = _gains(bench), abs(bench.speed_rpm()) * bench.params["NOPOLESPAIRS"] * np.pi / 30.0
-    if loop == "current":
-        if bench.state() != "CLOSED": # without load the rotor's d axis lies along the forced angle's current
-            true = replace(true, ld=true.lq, lq=true.ld)
-        return lambda hz: of_q_current(hz, true, gains, omega_e)
-    return lambda hz: loops.speed_loop(hz, true, header, gains, omega_e)
-
-
-def of_q_current(hz: np.ndarray, plant: loops.Plant, gains: loops.Gains, omega_e: float) -> np.ndarray:
-    """The q axis' loop while that of the d axis is closed. The complex loop of a frame that turns is a + j b at the positive, the conjugate of a - j b at
-    the negative frequency: a along each axis, b from one to the other."""
-    def parts(axis: str) -> tuple[np.ndarray, np.ndarray]:
-        there, back = (loops.current_loop(sign * hz, plant, gains, omega_e, axis) for sign in (1.0, -1.0))
-        return 0.5 * (there + np.conj(back)), -0.5j * (there - np.conj(back))
-    (along_d, across_d), (along_q, across_q) = parts("d"), parts("q")
-    return along_q + across_d * across_q / (1.0 + along_d)
-
+# ---- the tuner's model of a step, with what the firmware uses at this moment ------------------------------------------------
 
 def answers_of(name: str, bench: Bench, motor: motor_file.Motor | None, load_nm: float) -> tuple[np.ndarray, np.ndarray]:
     """Times since a step, and what the model answers."""
@@ -107,21 +52,12 @@ def answers_of(name: str, bench: Bench, motor: motor_file.Motor | None, load_nm:
     true, header = plants(bench.params, motor)
     slow_s, omega_e = response.SLOW_PERIODS * period_s, abs(bench.speed_rpm()) * bench.params["NOPOLESPAIRS"] * np.pi / 30.0
     hz = np.arange(1, SPEED_STEPS // 2 + 1) / SPEED_STEPS / slow_s
-    base = _gains(bench)
+    base = gains_of(bench)
     if name == "load": # the innovation's gate opens
         base = loops.speed_gains(header, bench.params["SPEED_BANDWIDTH_HZ"], bench.params["LOAD_BANDWIDTH_HZ"], base, omega_e)["quick"]
     reference, torque = loops.SpeedLoops(hz, header).closed(true, base, omega_e)
     closed = np.concatenate([[1.0], reference]) if name == "speed" else np.concatenate([[0.0], torque * load_nm / omega_e])
     return np.arange(SPEED_STEPS) * slow_s, step.answer_of(closed)
-
-
-def _gains(bench: Bench) -> loops.Gains:
-    """Those that the firmware uses at this moment."""
-    params, get = bench.params, bench.firmware.get
-    rad_s = params["COUNT_SPEED_RPM"] * params["NOPOLESPAIRS"] * np.pi / 30.0
-    return loops.Gains(params["CURRENT_KP_D"], params["CURRENT_KP_Q"], params["CURRENT_KI"],
-                       get(f"{response.RUN}.control.speed_kp_q13") / 8192.0 * params["COUNT_CURRENT_A"] / rad_s,
-                       get(f"{response.RUN}.observer.rate_q16") / response.TURN, get(f"{response.RUN}.model.kfilter_esdq_q16") / response.TURN, bench.period_s)
 
 
 # ---- boards ------------------------------------------------------------------------------------------------------------------
@@ -130,7 +66,7 @@ def _gains(bench: Bench) -> loops.Gains:
 class Place:
     """A board with a motor, whichever, and how it ends."""
 
-    bench: Bench
+    bench: Driven
     motor: motor_file.Motor | None
     board: Board | None
     """the virtual one"""
@@ -149,7 +85,7 @@ def virtual(options: argparse.Namespace, loop: str) -> Place:
     live = live_board.LiveBoard(parts)
     link = lnet.connect(live_board.BoardStream(live))
     link.answer_s = ANSWER_S
-    return Place(Bench(Firmware(link, Symbols.read(parts.symbols)), parts.library.params, live.run), motor_file.load(str(parts.motor.path)), live.board,
+    return Place(Driven(Firmware(link, Symbols.read(parts.symbols)), parts.library.params, live.run), motor_file.load(str(parts.motor.path)), live.board,
                  parts.motor.title, str(paths.shown(parts.motor.path)))
 
 
@@ -163,7 +99,7 @@ def real(options: argparse.Namespace) -> Place:
         link = lnet.connect(options.port)
     except lnet.LnetError as error:
         raise UserError(str(error), options.port, "is it this port, is the board on, is its firmware built with SCOPE 1?") from None
-    return Place(Bench(Firmware(link, symbols), library.params), motor, None, *((motor.title, str(paths.shown(motor.path))) if motor else ("the header's motor", "")))
+    return Place(Driven(Firmware(link, symbols), library.params), motor, None, *((motor.title, str(paths.shown(motor.path))) if motor else ("the header's motor", "")))
 
 
 # ---- measuring ---------------------------------------------------------------------------------------------------------------
@@ -190,9 +126,7 @@ def measured(place: Place, loop: str, options: argparse.Namespace) -> tuple[Resu
     finally:
         with contextlib.suppress(lnet.LnetError):
             bench.stop()
-    hz = np.array([point.hz for point in found])
-    expected = model(hz)
-    return Result(loop, found, expected, speed_rpm, load_nm, loops.margins(hz, np.array([point.response for point in found])), loops.margins(hz, expected)), answers
+    return Result.of(loop, found, model, speed_rpm, load_nm), answers
 
 
 def _answers(place: Place, loop: str, load_nm: float | None) -> list[step.Answer]:
@@ -206,7 +140,7 @@ def _answers(place: Place, loop: str, load_nm: float | None) -> list[step.Answer
     if board is not None and load_nm is not None:
         board.set(BRAKE, 0.0)
         bench.pause(SETTLE_S)
-        found.append(_answer("load", *step.load(bench, seconds, lambda: board.set(BRAKE, load_nm)), *answers_of("load", bench, motor, load_nm)))
+        found.append(_answer("load", *step.load(bench, seconds, lambda on: board.set(BRAKE, load_nm if on else 0.0)), *answers_of("load", bench, motor, load_nm)))
     return found
 
 
@@ -251,9 +185,7 @@ def _margin(margins: loops.Margins) -> str:
 
 def write(folder: Path, result: Result, title: str) -> None:
     """Plot and numbers of a loop."""
-    rows = [[f"{point.hz:.6g}", *(f"{number:.6g}" for value in (point.response, model) for number in (20.0 * np.log10(abs(value)), np.degrees(np.angle(value)))),
-             f"{point.spread:.3g}"] for point, model in zip(result.points, result.model)]
-    output.write_csv(folder / f"{result.loop}.csv", ["hz", "measured_db", "measured_deg", "model_db", "model_deg", "spread"], rows)
+    output.write_csv(folder / f"{result.loop}.csv", list(COLUMNS), [[f"{number:.6g}" for number in row] for row in result.table])
     figure, (size, phase) = plt.subplots(2, 1, sharex=True, figsize=(8, 5.6), layout="constrained")
     hz, response = np.array([point.hz for point in result.points]), np.array([point.response for point in result.points])
     for values, colour, marks, label in ((result.model, "tab:blue", "", "tuner's model"), (response, "tab:orange", "o", "measured")):

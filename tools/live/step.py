@@ -13,6 +13,8 @@ from .response import CURRENT_SHARE, POLL_S, RUN, SINE, TURN, Bench
 STEPS = ("current", "speed", "load")
 CURRENT_RECORDS = 8
 """Whose mean is the current's answer."""
+LOAD_RECORDS = 8
+"""And the load's: one dip is as much as half deeper than another, by where in its turn the rotor is when the load comes."""
 SPEED_STEP = 0.1
 """Of the speed."""
 BEFORE = 0.1
@@ -20,7 +22,7 @@ BEFORE = 0.1
 SETTLED = {"current": 0.1, "speed": 0.1, "load": 0.02}
 """Of the step, of the load's: of the speed."""
 QUARTER = 16384
-REST_S = 0.5
+REST_S, UNLOADED_S = 0.5, 1.0
 LEFT_STEPS = 100
 """Of 0.4 ms, that the current's step lasts."""
 
@@ -121,12 +123,18 @@ def speed(bench: Bench, seconds: float) -> tuple[np.ndarray, np.ndarray]:
     return time_s - _begin(time_s, share), share
 
 
-def load(bench: Bench, seconds: float, act: Callable[[], None]) -> tuple[np.ndarray, np.ndarray]:
-    """A load that `act` puts on: the speed's change, of the speed."""
-    time_s, erpm = _record(bench, seconds, act)
-    first = erpm[:max(2, round(0.5 * BEFORE * len(erpm)))].mean()
-    share = erpm / first - 1.0
-    return time_s - _begin(time_s, -share), share
+def load(bench: Bench, seconds: float, put: Callable[[bool], None]) -> tuple[np.ndarray, np.ndarray]:
+    """A load that `put` puts on and takes off: the speed's change, of the speed."""
+    records = []
+    for _ in range(LOAD_RECORDS):
+        time_s, erpm = _record(bench, seconds, lambda: put(True))
+        put(False)
+        bench.pause(UNLOADED_S)
+        first = erpm[:max(2, round(0.5 * BEFORE * len(erpm)))].mean()
+        share = erpm / first - 1.0
+        records.append((time_s - _begin(time_s, -share), share))
+    since_s = records[0][0]
+    return since_s, np.mean([np.interp(since_s, time_s, share) for time_s, share in records], axis=0)
 
 
 def _begin(time_s: np.ndarray, share: np.ndarray) -> float:
