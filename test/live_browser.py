@@ -1,11 +1,16 @@
 """A plugin of pytest: the browser for the tests of make live's page, and the page as a user sees it."""
 
+import itertools
 import subprocess
 import time
 
 import pytest
 
 SIZE = (1400, 900)
+CONTROLS = "button, select, input, summary, a[href], .push, #pot, [tabindex='0']"
+PLACES = f"""[...document.querySelectorAll("{CONTROLS}")].filter((e) => e.getClientRects().length).map((e) => {{
+    const r = e.getBoundingClientRect(); return [e.id || e.dataset.fault || e.dataset.button || e.dataset.mode || e.name || e.tagName, r.left, r.top + scrollY, r.right, r.bottom + scrollY]; }})"""
+"""Of the controls that are seen: name, left, top, right, bottom."""
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +67,9 @@ class Page:
         self.wait(f"return document.querySelector('#states .now')?.dataset.state === '{name}'", f"the state is not {name}")
 
     def click(self, selector: str) -> None:
-        self.one(selector).click()
+        element = self.one(selector)
+        self.run("arguments[0].scrollIntoView({ block: 'center' })", element) # of what is half in sight the middle may be another part's
+        element.click()
 
     def axe(self, root) -> tuple[int, list[str]]:
         """Rules of accessibility that hold, and what breaks one."""
@@ -74,3 +81,29 @@ class Page:
 
     def slide(self, key: str, value: float) -> None:
         self.run("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", self.one(f'input[name="{key}"]'), value)
+
+
+def dark(page: Page, on: bool) -> None:
+    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark" if on else "light"}]})
+
+
+def resized(page: Page, width: int, height: int = 800) -> None:
+    from tools.live import browser
+    browser.resize(page.driver, width, height)
+    page.wait(f"return innerWidth === {width}", "size")
+    page.run("return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def inside(page: Page, script: str, *arguments):
+    """Runs it where the page's own names are known, and no frame of the board comes between."""
+    return page.run(f"return window.eval({script!r})", *arguments)
+
+
+def overlapping(places: list) -> list[tuple[str, str]]:
+    """Pairs of controls that share more than their edges, without those that hold one another."""
+    def shared(a, b) -> bool:
+        return min(a[3], b[3]) - max(a[1], b[1]) > 1.5 and min(a[4], b[4]) - max(a[2], b[2]) > 1.5
+
+    def holds(a, b) -> bool:
+        return a[1] <= b[1] and a[2] <= b[2] and a[3] >= b[3] and a[4] >= b[4]
+    return [(a[0], b[0]) for a, b in itertools.combinations(places, 2) if shared(a, b) and not holds(a, b) and not holds(b, a)]

@@ -1,10 +1,9 @@
 """The page of make live as it lies on the screen: nothing moves, overlaps or is wider than the window, from a phone to a wide desk, light and dark; all of it by keyboard."""
 
-import itertools
 import re
 
 import pytest
-from live_browser import SIZE, Page
+from live_browser import CONTROLS, PLACES, SIZE, Page, dark, inside, overlapping, resized
 from live_support import Living, known, parts, served, until
 
 from tools.live import page as page_text
@@ -15,9 +14,6 @@ RELEASE = (390, 500, 768, 1400, 2560)
 """On each push one of each of page.css's layouts."""
 WIDTHS = [pytest.param(width, marks=[pytest.mark.release] * (width in RELEASE)) for width in (360, 390, 500, 720, 768, 900, 1000, 1280, 1400, 1800, 2560)]
 CURVE_PX = 300
-CONTROLS = "button, select, input, summary, a[href], .push, #pot, [tabindex='0']"
-PLACES = f"""[...document.querySelectorAll("{CONTROLS}")].filter((e) => e.getClientRects().length).map((e) => {{
-    const r = e.getBoundingClientRect(); return [e.id || e.dataset.fault || e.dataset.button || e.dataset.mode || e.name || e.tagName, r.left, r.top + scrollY, r.right, r.bottom + scrollY]; }})"""
 STYLE = (page_text.HERE / "page.css").read_text(encoding="utf-8")
 
 
@@ -30,36 +26,10 @@ def page(chromium, server) -> Page:
     return page
 
 
-def dark(page: Page, on: bool) -> None:
-    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark" if on else "light"}]})
-
-
-def resized(page: Page, width: int, height: int = 800) -> None:
-    from tools.live import browser
-    browser.resize(page.driver, width, height)
-    page.wait(f"return innerWidth === {width}", "size")
-    page.run("return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-
-
-def inside(page: Page, script: str, *arguments):
-    """Runs it where the page's own names are known, and no frame of the board comes between."""
-    return page.run(f"return window.eval({script!r})", *arguments)
-
-
 def scope_open(page: Page, opened: bool = True, then: str = "null"):
     """Its cursors, its spectrum and the record of a fault are shown, or not; `then` is looked at, before another trace comes."""
     return inside(page, """((on) => { for (const id of ["scope-cursors", "scope-fft"]) { if ((by(id).getAttribute("aria-pressed") === "true") !== on) { by(id).click(); } }
         by("scope-why").hidden = !on; return %s; })(%s)""" % (then, str(opened).lower()))
-
-
-def overlapping(places: list) -> list[tuple[str, str]]:
-    """Pairs of controls that share more than their edges, without those that hold one another."""
-    def shared(a, b) -> bool:
-        return min(a[3], b[3]) - max(a[1], b[1]) > 1.5 and min(a[4], b[4]) - max(a[2], b[2]) > 1.5
-
-    def holds(a, b) -> bool:
-        return a[1] <= b[1] and a[2] <= b[2] and a[3] >= b[3] and a[4] >= b[4]
-    return [(a[0], b[0]) for a, b in itertools.combinations(places, 2) if shared(a, b) and not holds(a, b) and not holds(b, a)]
 
 
 # ---- nothing moves -----------------------------------------------------------------------------------------------------------

@@ -10,11 +10,12 @@ import pytest
 from live_support import Living, known, parts, until
 from support import command, refusal, refused
 
+from tools.bench.scenario import BRAKE
 from tools.live import symbols
 from tools.live.__main__ import main
 from tools.live.line import Line
 from tools.live.lnet import connect
-from tools.live.real_board import RealBoard
+from tools.live.real_board import LEASE_MS, RealBoard
 from tools.live.watch import WATCHED, Watch, blocks
 
 SYMBOLS = known()
@@ -122,12 +123,46 @@ def test_the_record_of_a_fault_comes_over_the_same_line(desk):
     desk.do(fault=["open_b", True])
     trace = desk.trace()
     states = [row[1 + setup["channels"].index("board_drive.state")] for row in trace["rows"]]
-    assert trace["fault"] == "OPEN_PHASE" and states == [5.0] * 39 + [7.0] * 14
+    before = round(setup["position"] * (len(states) - 1))
+    assert trace["fault"] == "OPEN_PHASE" and len(states) >= 52 and states == [5.0] * before + [7.0] * (len(states) - before)
     desk.page.scope.ask(setup | {"mode": "stop"})
     desk.do(fault=["open_b", False])
     desk.page.act({"stop": True})
     desk.page.act({"clear": True})
     until(lambda: desk.frame()["fault"] == "NONE", "not cleared")
+
+
+def test_a_loop_is_measured_while_the_watch_and_the_lease_go_on_and_ends_with_the_motor(desk):
+    loops = desk.page.loops
+    loops.count, loops.rounds = 4, 1
+    desk.do(set=[BRAKE, 0.4 * desk.board.rated.rated_torque_nm])
+    desk.state("STOPPED")
+    refusal(lambda: desk.page.act({"measure": "speed"}), "a loop is measured while the motor turns")
+    desk.page.act({"start": 1500.0}, "a tab")
+    desk.state("CLOSED")
+    desk.page.act({"measure": "speed"})
+    frames = [desk.frame()]
+    until(lambda: (frames.append(desk.frame()), not loops.told["running"])[1], lambda: str(loops.told), 60.0)
+    assert loops.told["done"] == loops.told["of"] == 4 and loops.told["margins"]["measured"][1] is not None, loops.told
+    assert {frame["state"] for frame in frames} == {"CLOSED"} and not any(frame["silent"] for frame in frames)
+    assert max(frame["now"]["lease_ms"] for frame in frames) <= LEASE_MS and len({frame["now"]["angle_deg"] for frame in frames}) > 20
+    assert frames[0]["unmeasured"]["current"] == "the speed loop is being measured" and desk.page.loop().startswith("hz,measured_db,")
+    desk.page.act({"measure": "speed"})
+    until(lambda: (desk.frame(), loops.told["done"])[1], "no point", 30.0)
+    desk.pace(0.0001)
+    until(lambda: (desk.frame(), not loops.told["running"])[1], "it does not end", 30.0)
+    assert loops.told["said"].startswith("no connection: no answer to service") and loops.told["said"].endswith("; 1 of 4 points measured")
+    desk.pace(1.0)
+    until(lambda: not desk.frame()["silent"] and desk.frame()["unmeasured"]["speed"] is None, "it does not come back", 30.0)
+    desk.page.act({"measure": "speed"})
+    until(lambda: (desk.frame(), loops.told["done"])[1], "no point", 30.0)
+    desk.page.left("a tab")
+    until(lambda: (desk.frame(), not loops.told["running"])[1], "it does not end", 30.0)
+    assert "the motor has left CLOSED" in loops.told["said"]
+    desk.frame()
+    assert any("speed loop: the motor has left CLOSED" in line["text"] for line in desk.page.log)
+    desk.state("STOPPED")
+    desk.do(set=[BRAKE, 0.0])
 
 
 @pytest.mark.parametrize("wish, part", [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tools.bench import build, command_common
 from tools.bench.scenario import Scenario
 from tools.bench.scenario_file import MOTOR
-from tools.common import command_line, paths
+from tools.common import command_line, motor_file, paths
 from tools.common.errors import UserError
 
 from .pace import PACES
@@ -60,8 +60,9 @@ def _real(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any
     from .real_board import RealBoard
     from .symbols import Symbols
     symbols = Symbols.read(options.elf or IMAGE)
-    tuning = _tuning(options, parts, symbols)
-    return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params, tuning)
+    tuning, modes = _tuning(options, parts, symbols), command_common.macros(options.defines)
+    motor = motor_file.load(str(parts.motor.path)) if options.motor else None # else the header says what the motor is
+    return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params, tuning, motor, modes)
 
 
 def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any]:

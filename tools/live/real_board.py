@@ -3,15 +3,16 @@
 import math
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tools.common import drive_tables
+from tools.common import drive_tables, motor_file
 from tools.common.errors import UserError
 
 from . import lnet, view
 from .kept import Kept
+from .loop_response import LoopResponse, measured_loop
 from .pace import FRAME_S
 from .scope import Scope
 from .symbols import Symbols
@@ -42,10 +43,12 @@ class Remote:
 class RealBoard:
     """As VirtualBoard for the server; time passes by itself."""
 
-    def __init__(self, port: Any, title: str, symbols: Symbols, params: Mapping[str, float], tuning: Tuning | None = None) -> None:
+    def __init__(self, port: Any, title: str, symbols: Symbols, params: Mapping[str, float], tuning: Tuning | None = None,
+                 motor: motor_file.Motor | None = None, modes: Collection[str] = ()) -> None:
         self.port, self.title, self.symbols, self.params = port, title, symbols, params
         self.watch = Watch(symbols, params)
         self.kept, self.tuning = Kept.of(symbols), tuning
+        self.loops = LoopResponse.of(symbols, params, motor, modes, time.monotonic)
         self.begun_s = time.monotonic()
         self.time_s = 0.0
         self.values: dict[str, float] | None = None
@@ -79,6 +82,8 @@ class RealBoard:
         self.scope = Scope(self._link, self.symbols, self.params, publish, self._beat)
         if self.tuning is not None:
             self.tuning.publish = publish
+        if self.loops is not None:
+            self.loops.attach(self.scope)
         self.scope.start()
 
     def end(self) -> None:
@@ -137,7 +142,7 @@ class RealBoard:
 
     # ---- the page ----------------------------------------------------------------------------------------------------------
     def act(self, command: Any, who: Any = None) -> None:
-        """One of {"start": rpm}, {"target": rpm}, {"stop": true}, {"clear": true}, {"keep": true}, {"forget": true}."""
+        """One of {"start": rpm}, {"target": rpm}, {"stop": true}, {"clear": true}, {"keep": true}, {"forget": true}, {"measure": "speed"}."""
         name, value = next(iter(command.items())) if isinstance(command, dict) and len(command) == 1 else (None, None)
         if name in ("start", "target"):
             low, high = self._range()
@@ -151,6 +156,8 @@ class RealBoard:
             self.note("clear the fault")
         elif name in ("keep", "forget") and self.kept is not None:
             self.kept.ask(name.upper())
+        elif name == "measure" and self.loops is not None:
+            self.loops.ask(value, "" if self.was_silent else self.state)
         else:
             raise UserError("no such command", "page", "a real board takes start, target, stop, clear and scope")
 
@@ -186,7 +193,7 @@ class RealBoard:
         return {"virtual": False, "motor": self.title, "board": str(self.port), "defines": [], "sliders": {}, "throws": [],
                 "remote": {"low": low, "high": high}, "max_current_a": self.params["MAXIMUM_CURRENT_A"], "nominal_bus_v": self.params["NOMINAL_BUS_V"],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(False), "kept": self.kept is not None, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
+                "panels": view.panels(False), "kept": self.kept is not None, "loops": self.loops and self.loops.told, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:
         """How things stand, as far as the board has told."""
@@ -198,7 +205,7 @@ class RealBoard:
             new = [self._strip_row(values)]
             self.strip.extend(new)
             self.rows.append({"time_s": round(self.time_s, 3)} | values)
-        for part in (self.kept, self.tuning):
+        for part in (self.kept, self.tuning, self.loops):
             while part is not None and part.news:
                 self.note(part.news.popleft())
         told, self.told = self.told, self.lines
@@ -207,7 +214,7 @@ class RealBoard:
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
                 "now": {name: round(value, 4) for name, value in values.items()} if values else None, "outputs": 63 if self.state in view.ON and not silent else 0,
                 "strip": new, "orbit": self._vectors(values), "log": [line for line in self.log if line["id"] >= told],
-                "kept": self.kept.told() if self.kept else None,
+                "kept": self.kept.told() if self.kept else None, "unmeasured": self.loops and self.loops.refusals("" if silent else self.state),
                 "remote": None if self.remote is None else {"run": self.remote.run, "target_rpm": self.remote.target_rpm},
                 "silent": silent}
 
@@ -252,6 +259,10 @@ class RealBoard:
         if self.tuning is None:
             raise UserError("no parameter can change", "page", FIXED)
         return self.tuning.saved()
+
+    def loop(self) -> str:
+        """The loop that was measured last."""
+        return measured_loop(self.loops)
 
     def csv(self) -> str:
         """What was read, a row a frame, of the last ten minutes."""

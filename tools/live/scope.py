@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from tools.common import drive_tables
 from tools.common.errors import UserError
@@ -48,6 +48,16 @@ class Setup:
     mode: str
 
 
+class Guest(Protocol):
+    """Other work that needs the firmware's scope for a while."""
+
+    asked: Any
+    """None: nothing to do"""
+
+    def run(self, link: lnet.Lnet, moment: Callable[[], None]) -> None:
+        """Does it, and calls `moment` now and then."""
+
+
 class Scope(threading.Thread):
     """`open_link` makes the link, `publish` gets messages for the pages. `beat` runs between two requests: other work that needs the link."""
 
@@ -58,6 +68,9 @@ class Scope(threading.Thread):
         self.period_s = params["LOOPTIME_SEC"]
         self.setup: Setup | None = None
         self.link: lnet.Lnet | None = None
+        self.guest: Guest | None = None
+        self.lent = False
+        """The guest has the firmware's scope; the traces come back afterwards."""
         self.ended = False
         self.answer_s = lnet.ANSWER_S
         """How long it waits for an answer; a board that runs slower than real time answers later."""
@@ -92,7 +105,7 @@ class Scope(threading.Thread):
     def ask(self, wish: Any) -> None:
         """A setup as the page sends it; refused in one line where it makes no sense."""
         self.setup = self._read(wish)
-        self._tell(setup=wish, status="stop" if self.setup.mode == "stop" else "waits")
+        self._tell(setup=wish, status=self._status())
         self.changed.set()
 
     def _read(self, wish: Any) -> Setup:
@@ -116,6 +129,9 @@ class Scope(threading.Thread):
     def _named(self, name: Any) -> Variable:
         return self.symbols.find(name if isinstance(name, str) else str(name))
 
+    def _status(self) -> str:
+        return "lent" if self.lent else "stop" if self.setup is None or self.setup.mode == "stop" else "waits"
+
     def _tell(self, **news: Any) -> None:
         self.told = self.told | news
         self.publish({"scope": self.told})
@@ -128,7 +144,7 @@ class Scope(threading.Thread):
                     self.link = self.open_link()
                     self.link.device_info()
                     if self.told["status"] not in ("waits", "stop"): # it answers again
-                        self._tell(status="stop" if self.setup is None or self.setup.mode == "stop" else "waits")
+                        self._tell(status=self._status())
                 self._round(self.link)
             except (lnet.LnetError, OSError) as error:
                 self.link = None
@@ -145,6 +161,9 @@ class Scope(threading.Thread):
         self.changed.clear()
         link.answer_s = self.answer_s
         self.beat(link)
+        if self.guest is not None and self.guest.asked is not None:
+            self._lend(link, self.guest)
+            return
         if setup is None or setup.mode == "stop":
             self.changed.wait(POLL_S)
             return
@@ -163,6 +182,23 @@ class Scope(threading.Thread):
         rows = link.scope_read()
         if rows: # none where the board has been switched off meanwhile
             self._hand_on(setup, rows)
+
+    def _lend(self, link: lnet.Lnet, guest: Guest) -> None:
+        """The traces wait until the guest has done."""
+        def moment() -> None:
+            if self.ended:
+                raise lnet.LnetError("the server has ended")
+            link.answer_s = self.answer_s
+            self.beat(link)
+            time.sleep(POLL_S)
+        self.lent = True
+        self._tell(status="lent")
+        try:
+            guest.run(link, moment)
+            link.scope_stop()
+        finally:
+            self.lent = False
+            self._tell(status=self._status())
 
     def _length_s(self, setup: Setup, size: int) -> float:
         return size / sum(item.bytes for item in setup.channels) * setup.factor * self.period_s

@@ -23,7 +23,8 @@ AHEAD = 2
 MOST_ROWS, MOST_LINES = 2000, 200
 """Of curves and log in such a frame."""
 LONGEST_MESSAGE = 4096
-SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv"), "header": ("userparams.h", "text/x-c")}
+SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv"), "header": ("userparams.h", "text/x-c"),
+         "loop": ("loop.csv", "text/csv")}
 
 
 class Tab:

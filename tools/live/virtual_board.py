@@ -21,6 +21,7 @@ from .faults import FAULTS, keys_of
 from .kept import Kept
 from .line import Line
 from .lnet import ANSWER_S, Lnet
+from .loop_response import LoopResponse, measured_loop
 from .record import Records
 from .recording import BUTTONS, POT, Origin, Recording
 from .scope import Scope
@@ -57,6 +58,7 @@ class VirtualBoard:
         self.settings = {key: row["start"] for key, row in self.sliders.items()}
         self.faults: list[str] = []
         self.held: dict[str, set[Any]] = {button: set() for button in BUTTONS.values()}
+        self.loops = LoopResponse.of(symbols, library.params, self.rated, origin.defines, lambda: self.time_s)
         self.board: Board | None = None
         self.runs = 0
         self.power_up()
@@ -79,8 +81,9 @@ class VirtualBoard:
         self.publish = publish
         if self.symbols is not None and self.records is None:
             self.scope = Scope(lambda: Lnet(self.line), self.symbols, self.library.params, publish, self._beat)
+            if self.loops is not None:
+                self.loops.attach(self.scope)
             self.scope.start()
-
         if self.tuning is not None:
             self.tuning.publish = publish
 
@@ -210,10 +213,13 @@ class VirtualBoard:
 
     # ---- what somebody does ----------------------------------------------------------------------------------------------
     def act(self, command: Any, who: Any = None) -> None:
-        """One of {"press": "S2"}, {"release": "S2"}, {"set": [key, value]}, {"fault": [name, true]}, {"power": true}, {"keep": true}, {"forget": true}."""
+        """One of {"press": "S2"}, {"release": "S2"}, {"set": [key, value]}, {"fault": [name, true]}, {"power": true}, {"keep": true},
+        {"forget": true}, {"measure": "speed"}."""
         work = {"press": self._press, "release": self._let_go, "set": self._turn, "fault": self._break, "power": lambda value, who: self.power_up()}
         if self.kept is not None:
             work |= {name: lambda value, who, request=name.upper(): self.kept.ask(request) for name in ("keep", "forget")}
+        if self.loops is not None:
+            work |= {"measure": lambda wish, who: self.loops.ask(wish, self.state)}
         if not isinstance(command, dict) or len(command) != 1 or next(iter(command)) not in work:
             raise UserError("no such command", "page", "send one of " + ", ".join(work))
         name, value = next(iter(command.items()))
@@ -300,12 +306,12 @@ class VirtualBoard:
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(True), "kept": self.kept is not None, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None,
+                "panels": view.panels(True), "kept": self.kept is not None, "loops": self.loops and self.loops.told, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None,
                 "recorder": self.records and self.records.hello(self.symbols or Symbols({}))}
 
     def frame(self) -> dict[str, Any]:
         """What has happened since the last frame, and how things stand."""
-        for part in (self.kept, self.tuning):
+        for part in (self.kept, self.tuning, self.loops):
             while part is not None and part.news:
                 self.note(part.news.popleft(), kind="action")
         told, self.told = self.told, self.lines
@@ -317,7 +323,7 @@ class VirtualBoard:
         return {"t": round(self.time_s, 4), "state": self.state, "fault": self.fault,
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
                 "now": view.now(trace, rows) | {"power_w": round(self.board.get("bus.voltage_v") * self.board.get("bus.current_a"), 3)},
-                "kept": self.kept.told() if self.kept else None,
+                "kept": self.kept.told() if self.kept else None, "unmeasured": self.loops and self.loops.refusals(self.state),
                 "outputs": int(self.board.get("pwm.outputs_seen")),
                 "leds": {name: int(self.board.get("pin." + pins.firmware()[f"led_{name}"].pin)) for name in ("alive", "run")},
                 "settings": self.settings, "run": self.runs,
@@ -334,6 +340,10 @@ class VirtualBoard:
         if self.tuning is None:
             raise UserError("no parameter can change", "page", FIXED)
         return self.tuning.saved()
+
+    def loop(self) -> str:
+        """The loop that was measured last."""
+        return measured_loop(self.loops)
 
     def csv(self) -> str:
         """The trace since power-up, at most that of the last two minutes."""

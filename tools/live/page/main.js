@@ -29,10 +29,10 @@ function begin(hello) {
   by("what").textContent = by("what").title = [hello.motor, hello.board, ...hello.defines].join(" · ");
   ["sliders", "throws", "states", "log", "pace"].forEach((id) => by(id).replaceChildren());
   for (const pace of hello.paces) { make("option", { value: pace, textContent: pace === 1 ? "real time" : `1 : ${Math.round(1 / pace)}` }, by("pace")); }
-  const drive = new DriveView(hello), strips = new StripsView(hello);
   const send = (command) => link.send(command);
+  const drive = new DriveView(hello), strips = new StripsView(hello), loops = new LoopsView(hello, send);
   const own = hello.virtual ? [board, new BenchView(hello, send), rotor ??= new RotorView(hello)] : [new RemoteView(hello.remote, send)];
-  views = { drive, strips, scope: new ScopeView(hello, send), tuning: new TuningView(hello, send), planes: new PlanesView(hello), all: [drive, strips, new KeptView(hello, send), ...own] };
+  views = { drive, strips, loops, scope: new ScopeView(hello, send), tuning: new TuningView(hello, send), planes: new PlanesView(hello), all: [drive, strips, loops, new KeptView(hello, send), ...own] };
   run = 0;
 }
 
@@ -47,13 +47,14 @@ function tempo(frame) {
 
 // The next message comes when this one is on the screen: a slow machine, or a tab out of sight, gets fewer.
 function take(message) {
-  if (message.t !== undefined || message.scope || message.trace || message.armed || message.tuning) { requestAnimationFrame(() => link.send({ seen: true })); }
+  if (message.t !== undefined || message.scope || message.trace || message.armed || message.tuning || message.loops) { requestAnimationFrame(() => link.send({ seen: true })); }
   if (message.hello) { begin(message.hello); return; }
   if (message.ended) { say(`The board has stopped: ${message.ended}`); return; }
   if (message.refused) { foc33.refused = message.refused; warn(message.refused); return; }
   if (!views) { return; }
   if (message.scope) { views.scope.set(message.scope); return; }
   if (message.armed) { views.scope.armed(); return; }
+  if (message.loops) { views.loops.set(message.loops); return; }
   if (message.tuning) { views.tuning.set(message.tuning); return; }
   if (message.trace) { views.scope.draw(message.trace); foc33.traces++; return; }
   if (run && message.run !== run) { views.drive.clear(); views.strips.clear(); }
@@ -68,12 +69,14 @@ function take(message) {
 
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { views?.strips.fit(); views?.scope.fit(); });
 
+addEventListener("resize", () => views?.loops.draw());
+
 by("power").addEventListener("click", () => link.send({ power: true }));
 by("pace").addEventListener("change", () => { paceBusy = performance.now() + 500; link.send({ pace: Number(by("pace").value) }); });
-for (const what of ["scenario", "csv", "header"]) {
+for (const what of ["scenario", "csv", "header", "loop"]) {
   by(`save-${what}`).addEventListener("click", async () => { // what cannot be saved says why, instead of an empty file
     const answer = await fetch(`/save/${what}${location.search}`);
     if (!answer.ok) { warn((await answer.text()).trim()); return; }
-    save(await answer.blob(), { scenario: "recorded.toml", csv: "recorded.csv", header: "userparams.h" }[what]);
+    save(await answer.blob(), { scenario: "recorded.toml", csv: "recorded.csv", header: "userparams.h", loop: "loop.csv" }[what]);
   });
 }

@@ -88,7 +88,7 @@ class ScopeView extends TracesView {
     by("scope-fault").setAttribute("aria-pressed", String(armed));
     if (armed) { this.expect(setup.channels, setup.channels.map((name) => this.units[name])); }
     this.why();
-    this.say({ waits: this.waits(), stop: "stopped" }[status] ?? status, !["waits", "stop"].includes(status));
+    this.say({ waits: this.waits(), stop: "stopped", lent: "suspended while a loop is measured" }[status] ?? status, !["waits", "stop", "lent"].includes(status));
   }
 
   waits() { return this.setup.trigger ? "waits for its trigger" : "records"; }
