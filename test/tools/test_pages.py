@@ -120,6 +120,6 @@ def test_the_workflow_runs_what_a_push_runs():
 def test_the_schedule_counts_the_slots_of_the_halves_that_call_a_function():
     lines = {line.split("`")[1]: line for line in tables.schedule().splitlines() if line.startswith("| `")}
     assert "| 2; 10 by `limit_and_learn` | 16 periods |" in lines["limit_currents"]
-    assert "| 3, 11; 7, 15 by `trim_speed` | 16 periods, at times 8 |" in lines["follow_speed"] # while the innovation gate is open
+    assert "| 3, 11 | 16 periods |" in lines["follow_speed"]
     assert "| 2; 10 by `limit_and_learn` | 16 periods |" in lines["limit_currents"]
     assert "| 14 | 32 periods |" in lines["check_model"]

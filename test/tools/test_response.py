@@ -35,7 +35,9 @@ def test_both_loops_of_the_hurst_have_the_margins_of_the_model_and_its_steps(tmp
     steps = {row["step"]: row for row in found["steps"]}
     for name in ("current", "speed"):
         assert abs(steps[name]["measured"]["rise_s"] / steps[name]["model"]["rise_s"] - 1.0) < 0.25
-    assert abs(steps["load"]["measured"]["peak"] / steps["load"]["model"]["peak"] - 1.0) < 0.25 and steps["load"]["measured"]["peak"] > 0.05
+    # the model has the quick rate from the first moment; the innovation's gate opens up to a millisecond later, in which this load takes 55 rpm
+    dip, expected = (steps["load"][name]["peak"] for name in ("measured", "model"))
+    assert 0.95 * expected < dip < expected + 55.0 / 1400.0 and expected > 0.05
     assert {path.name for path in (tmp_path / "result").iterdir()} == {f"{name}.{kind}" for name in ("current", "speed", "step_current", "step_speed", "step_load")
                                                                       for kind in ("png", "csv")} | {"summary.json", "summary.txt"}
 
