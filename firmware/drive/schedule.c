@@ -124,7 +124,7 @@ static void choose_state(drive_t *d, const drive_params_t *p, const drive_sample
     speed_choose_state(d, p);
 }
 
-/* wcet: speed_load_moves_against excludes trim_speed/speed_schedule */
+/* wcet: speed_load_moves_against excludes speed_schedule */
 /** The speed's error at rest; stall and lost lock. While the innovation gate is open the gains follow here, too, and the trim does not look at the load's way. */
 static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
