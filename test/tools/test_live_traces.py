@@ -354,7 +354,7 @@ def test_eight_channels_are_recorded_each_in_its_colour_and_a_ninth_word_is_refu
     page.click("[data-mode=single]")
     page.wait("return window.eval('views.scope.trace')?.names.length === 8", "no trace of eight")
     assert inside(page, "views.scope.trace.names.map((name) => views.scope.short(name))") == EIGHT
-    assert len(inside(page, "views.scope.trace.rows")) == 53 and len(set(inside(page, "views.scope.curves.map((curve) => tint(curve.color))"))) == 8
+    assert len(inside(page, "views.scope.trace.rows")) == 52 and len(set(inside(page, "views.scope.curves.map((curve) => tint(curve.color))"))) == 8
     inputs[7].send_keys(ALL + "bus_q31\n") # 32 bits
     page.wait("return document.getElementById('message').textContent.includes('9 words in a row')", "not refused")
     assert message(page) == "9 words in a row, scope: it can have 8: choose fewer variables"
@@ -387,7 +387,7 @@ def test_the_record_of_a_fault_comes_by_itself_with_cause_and_remedy_beside_it(p
     item = inside(page, "views.scope.trace")
     state, rows = item["names"].index("board_drive.state") + 1, item["rows"]
     assert item["triggered"] and {row[state] for row in rows if row[0] < -1e-9} == {5.0} and {row[state] for row in rows if row[0] >= 0.0} == {7.0}
-    assert sum(row[0] < 0.0 for row in rows) == 39 and rows[1][0] - rows[0][0] == pytest.approx(4 * 50e-6)
+    assert sum(row[0] < 0.0 for row in rows) == 38 and rows[1][0] - rows[0][0] == pytest.approx(4 * 50e-6)
     page.click("[data-mode=stop]")
     page.click("[data-fault=open_b]")
     page.wait("return window.eval('foc33.frame.broken').length === 0", "not mended")
