@@ -66,7 +66,7 @@ def test_the_image_s_board_and_the_pc_s_share_objects_and_flags():
 
 @pytest.mark.parametrize("options, folder", [
     ((), "board"), (("VARIANT=x", "DEFINES=-DTUNING"), "board"), (("VARIANT=y", "USERPARAMS=examples"), "board"),
-    (("VARIANT=x", "SAN=1"), "host-x-san"), (("VARIANT=x", "WERROR=1"), "host-x"), (("VARIANT=x", "CFLAGS=-O1"), "host-x")])
+    (("VARIANT=x", "SAN=1"), "host-x-san"), (("VARIANT=x", "WERROR=1"), "board-strict"), (("VARIANT=x", "CFLAGS=-O1"), "host-x")])
 def test_variants_share_the_board_s_objects_unless_they_compile_in_a_way_of_their_own(options, folder):
     said = make("-n", "-B", "vboard", *options).stdout
     assert re.findall(r"-c tools/plant/plant_motor\.c -o (\S+)/tools/plant/", said) == [f"build/{folder}"]
