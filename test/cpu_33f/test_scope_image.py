@@ -120,7 +120,7 @@ def test_sine_beside_the_currents_costs_a_period_no_more_than_it_is_said_to(benc
     put("scope_command.run", 1)
     live.run(0.3)
     put("board_drive.run.sine.step", 3000)
-    put("board_drive.run.sine.size_q", 400)
+    put("board_drive.run.sine.size_iq_q16", 400)
     without, running = interrupt(0), interrupt(1000)
     put("scope_command.run", 0)
     more = running.mean() - without.mean()

@@ -272,7 +272,7 @@ static void any_state(uint16_t state)
     drive.run.sine.left = ANYU16();
     drive.run.sine.step = ANYU16();
     drive.run.sine.angle = ANYU16();
-    drive.run.sine.size_q = ANY16();
+    drive.run.sine.size_iq_q16 = ANY16();
     drive.run.sine.size_rho_q17 = ANY16();
 #endif
     drive.run.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);

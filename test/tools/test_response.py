@@ -6,12 +6,14 @@ import pty
 import subprocess
 import sys
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pytest
 
 from tools.common import paths
-from tools.live import response, step
+from tools.common.errors import UserError
+from tools.live import response, response_command, response_model, step
 
 COMMAND = [sys.executable, "-m", "tools.live.response_command"]
 
@@ -56,12 +58,30 @@ def test_a_loop_that_is_not_the_models_is_marked_and_the_command_fails(tmp_path)
     (("--loop", "sped"), "invalid choice: 'sped'"),
     (("--loop", "speed", "--speed", "20"), "instead of 20 after 20 s, response: name a speed that it reaches"),
     (("--loop", "speed", "--defines=-DSCOPE=0"), "the firmware has no sine for its loops, response: build it with SCOPE 1"),
+    (("--speed", "nan"), "'nan' is no number"), (("--load", "much"), "'much' is no number"), (("--speed", "0"), "0 rpm, SPEED: name the speed"),
+    (("--loop", "speed", "--load", "1e9"), "is outside 0..100 N.m, LOAD"), (("--load", "1", "--port", "/dev/none"), "only the virtual board has a brake, LOAD"),
+    (("--cpu", "33f", "--port", "/dev/none"), "a board has its own processor, CPU"),
+    (("--loop", "current", "--speed", "500"), "the current loop is measured at END_SPEED_RPM without load, SPEED, LOAD: leave them out"),
     (("--port", "/dev/none", "--elf", "build/host-scope-1/foc33.elf"), "cannot open the port")])
 def test_what_cannot_be_measured_is_told_in_one_line(tmp_path, arguments, says):
     done = run("--out", str(tmp_path / "result"), *arguments)
     told = [line for line in done.stderr.splitlines() if line.startswith("foc33: ")]
     assert done.returncode == 2 and len(told) == 1 and says in told[0]
     assert not (tmp_path / "result").exists()
+
+
+def test_a_loop_whose_gain_never_crosses_one_has_shown_no_margin():
+    def measured_as(loop):
+        return response_model.Result.of("speed", [response.Point(hz, complex(loop(hz)), 0.0) for hz in (1.0, 1.5, 3.0, 4.0)], loop, 1000.0).holds
+    assert measured_as(lambda hz: -2j / hz) and not measured_as(lambda hz: -0.2j / hz)
+
+
+def test_a_motor_that_does_not_come_to_its_speed_is_stopped():
+    bench = mock.Mock(params={"NOMINAL_SPEED_RPM": 1000.0, "MINIMUM_SPEED_RPM": 100.0})
+    bench.start.side_effect = UserError("no speed", "response", "another one")
+    with pytest.raises(UserError, match="no speed"):
+        response_command.measured(response_command.Place(bench, None, None, "", ""), "speed", mock.Mock(speed=None))
+    bench.stop.assert_called_once_with()
 
 
 def test_a_silent_port_is_told(tmp_path):

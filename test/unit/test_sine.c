@@ -18,7 +18,7 @@ void setUp(void)
     drive.run.control.ref_q13.q = 1200;
     SINE->angle = 5000;
     SINE->step = 3000;
-    SINE->size_q = -4000;
+    SINE->size_iq_q16 = -4000;
     SINE->size_rho_q17 = 2000;
 }
 
@@ -51,7 +51,7 @@ void test_reference_and_sine_stay_within_the_largest_current(void)
         int16_t most = 0;
         SINE->left = 1;
         SINE->step = 256;
-        SINE->size_q = 32767;
+        SINE->size_iq_q16 = 32767;
         drive.run.control.ref_q13.q = (int16_t)(direction * (params.current_max_q13 - 100));
         for (n = 0; n < 256u; n++) {
             const int16_t asked = (int16_t)(direction * mode_asked(&drive.run, &params).q);
@@ -104,7 +104,7 @@ void test_controllers_follow_the_currents_with_the_sine(void)
     rig_tick(1);
     without = drive.run.control.v_q14.q;
     rig_closed(1, 8000);
-    SINE->size_q = -8000;
+    SINE->size_iq_q16 = -8000;
     SINE->angle = 16384;
     SINE->step = 0;
     SINE->left = 2;
@@ -121,7 +121,7 @@ void test_sine_ends_after_so_many_slow_steps_whatever_the_state(void)
         rig_closed(1, 8000);
         drive.state = (uint16_t)states[n];
         drive.ticks = 0;
-        SINE->size_q = 0;
+        SINE->size_iq_q16 = 0;
         SINE->size_rho_q17 = 0;
         SINE->left = 3;
         for (steps = 0; steps < 3u; steps++) {
@@ -138,9 +138,9 @@ void test_a_new_run_begins_without_a_sine(void)
 {
     rig_ready();
     SINE->left = 1000;
-    SINE->size_q = 100;
+    SINE->size_iq_q16 = 100;
     drive_start(&drive, &params, 1);
     rig_tick(4);
     TEST_ASSERT_EQUAL_UINT16(0, SINE->left);
-    TEST_ASSERT_EQUAL_INT16(0, SINE->size_q);
+    TEST_ASSERT_EQUAL_INT16(0, SINE->size_iq_q16);
 }

@@ -373,6 +373,7 @@ static uint16_t rates_come(uint16_t part, int16_t faster_erpm)
     drive.run.control.speed_kp_q13 = 0;
     drive.run.estimator.rho_q32 = drive.run.observer.rho_q32 + 8u * (uint32_t)qm_mulss((int16_t)(observer_speed(&drive.run.observer) + faster_erpm), params.observer.deltat_q32);
     rig_slow(part);
+    TEST_ASSERT_EQUAL_UINT16_MESSAGE((part & 7u) == 3u && drive.run.control.speed_kp_q13 > 0, drive.run.control.sample_shift_q13 > 0, "the sample's delay in its own slots");
     return (uint16_t)(drive.run.control.speed_kp_q13 > 0);
 }
 

@@ -14,6 +14,7 @@ from . import lnet, view
 from .kept import Kept
 from .loop_response import LoopResponse, measured_loop
 from .pace import FRAME_S
+from .response import TARGET_MODE
 from .scope import Scope
 from .symbols import Symbols
 from .tuning import FIXED, Tuning
@@ -23,7 +24,7 @@ LEASE_MS, RENEW_S = 2000, 0.5
 """How long the firmware obeys without hearing from the page; and how often it hears."""
 SILENT_S = 1.0
 """So long without an answer, and the page says so."""
-TARGET_MODE, PANEL_MODE = 1, 0
+PANEL_MODE = 0
 """Of scope_command."""
 CSV_S = 600.0
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from tools.common import drive_tables
 from tools.common.errors import UserError
+from tools.common.param_rows import slow_periods
 
 from . import view
 from .lnet import Channel, Lnet
@@ -28,7 +29,6 @@ CLEAR_OF_TURN = 0.15
 """Beside the electrical frequency a sine looks like an offset of a current's sensor: the loop is not measured so near."""
 CURRENT_SHARE, FORCED_SHARE, SPEED_SHARE, GATE_SHARE = 0.05, 0.15, 0.02, 0.4
 """Size of the sine: of the largest current, with the estimator's angle and with the forced one; of the speed, and of what the load observer takes for a load step."""
-SLOW_PERIODS = 8.0
 SIZE_MOST = 32767
 TURN = 65536.0
 ROUNDS = 3
@@ -63,13 +63,16 @@ class Firmware:
         self.link, self.symbols = link, symbols
 
     def of(self, name: str) -> Variable:
+        """The variable itself."""
         return self.symbols.find(name)
 
     def get(self, name: str) -> int:
+        """Its value, in counts."""
         variable = self.of(name)
         return variable.value(self.link.read(variable.address, variable.bytes))
 
     def put(self, name: str, value: int) -> None:
+        """Writes it; a value that does not fit is refused."""
         variable = self.of(name)
         self.link.write(variable.address, variable.data(value))
 
@@ -87,6 +90,8 @@ class Bench:
     def __init__(self, firmware: Firmware, params: Mapping[str, float], pause: Callable[[float], None] = time.sleep, rounds: int = ROUNDS) -> None:
         self.firmware, self.params, self._pause, self.rounds = firmware, params, pause, rounds
         self.period_s = params["LOOPTIME_SEC"]
+        self.slow_s = slow_periods(self.period_s) * self.period_s
+        """of a step of the load observer, and of the sine's `left`"""
         self.turning, self.hz = "", 0.0
         """the state that the motor must not leave, and the frequency that is measured"""
         if not has_sine(firmware.symbols):
@@ -95,7 +100,7 @@ class Bench:
     def frequencies(self, loop: str, points: int = POINTS) -> np.ndarray:
         """Where the loop is measured."""
         bandwidth_hz = self.params["CURRENT_BANDWIDTH_HZ" if loop == "current" else "SPEED_BANDWIDTH_HZ"]
-        step_s = self.period_s * (1.0 if loop == "current" else SLOW_PERIODS)
+        step_s = self.period_s if loop == "current" else self.slow_s
         low, high = (factor * bandwidth_hz for factor in SPAN[loop])
         grid = np.geomspace(max(low, LOWEST_HZ), min(high, HIGHEST[loop] / step_s), points)
         turn_hz = abs(self.speed_rpm()) * self.params["NOPOLESPAIRS"] / 60.0
@@ -128,9 +133,11 @@ class Bench:
         raise UserError(f"the speed does not stay where it is, {before:.0f} rpm", "response", "wait until it does")
 
     def state(self) -> str:
+        """Of the drive, by name."""
         return dict(enumerate(view.states())).get(self.firmware.get("board_drive.state"), "?")
 
     def fault(self) -> str:
+        """By name; NONE."""
         return {row.code: row.name for row in drive_tables.faults()}.get(self.firmware.get("board_drive.fault"), "?")
 
     def speed_rpm(self) -> float:
@@ -146,9 +153,9 @@ class Bench:
         step = max(1, round(hz * self.period_s * TURN))
         self.firmware.put(f"{SINE}.left", 0)
         self.firmware.put(f"{SINE}.step", step)
-        for name in ("size_q", "size_rho_q17"):
+        for name in ("size_iq_q16", "size_rho_q17"):
             self.firmware.put(f"{SINE}.{name}", sizes.get(name, 0))
-        self.firmware.put(f"{SINE}.left", min(65535, math.ceil(seconds / (SLOW_PERIODS * self.period_s))))
+        self.firmware.put(f"{SINE}.left", min(65535, math.ceil(seconds / self.slow_s)))
         return step / TURN / self.period_s
 
     def points(self, loop: str, frequencies: np.ndarray) -> Iterator["Point"]:
@@ -189,7 +196,7 @@ class Bench:
         size = min(SIZE_MOST, round(8.0 * share * self.params["MAXIMUM_CURRENT_A"] / self.params["COUNT_CURRENT_A"]))
         names = [f"{SINE}.angle", f"{RUN}.control.i_q13.q", f"{RUN}.control.i_q13.d", f"{RUN}.control.ref_q13.q"]
         factor = self._factor(hz, len(names))
-        hz = self.sine(hz, self._seconds(hz, factor, len(names)), size_q=size)
+        hz = self.sine(hz, self._seconds(hz, factor, len(names)), size_iq_q16=size)
         self.pause(SETTLE_S + SETTLE_TURNS / hz)
         rows = self._record(names, factor, hz)
         closed = wave(rows[:, 1], rows[:, 0]) / (size / 8.0)

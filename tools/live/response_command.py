@@ -4,6 +4,7 @@
 
 import argparse
 import contextlib
+import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tools.bench import build, command_common
-from tools.bench.board import Board, Library
+from tools.bench.board import Board, BoardError, Library
 from tools.bench.plots import plt, saved
 from tools.bench.report import clean
 from tools.bench.scenario import BRAKE
@@ -50,7 +51,7 @@ def answers_of(name: str, bench: Bench, motor: motor_file.Motor | None, load_nm:
         loop = model_of("current", bench, motor)(hz)
         return np.arange(CURRENT_STEPS) * period_s, step.answer_of(np.concatenate([[1.0], loop / (1.0 + loop)]))
     true, header = plants(bench.params, motor)
-    slow_s, omega_e = response.SLOW_PERIODS * period_s, abs(bench.speed_rpm()) * bench.params["NOPOLESPAIRS"] * np.pi / 30.0
+    slow_s, omega_e = bench.slow_s, abs(bench.speed_rpm()) * bench.params["NOPOLESPAIRS"] * np.pi / 30.0
     hz = np.arange(1, SPEED_STEPS // 2 + 1) / SPEED_STEPS / slow_s
     base = gains_of(bench)
     if name == "load": # the innovation's gate opens
@@ -108,11 +109,14 @@ def measured(place: Place, loop: str, options: argparse.Namespace) -> tuple[Resu
     """Starts the motor, measures the loop and its steps, stops."""
     bench, motor, load_nm = place.bench, place.motor, None
     rated_rpm = motor.rated_speed_rpm if motor else bench.params["NOMINAL_SPEED_RPM"]
-    bench.start(options.speed or max(SPEED_SHARE * rated_rpm, bench.params["MINIMUM_SPEED_RPM"]))
     try:
+        bench.start(options.speed or max(SPEED_SHARE * rated_rpm, bench.params["MINIMUM_SPEED_RPM"]))
         if loop == "speed" and place.board is not None and motor is not None:
             load_nm = options.load if options.load is not None else LOAD_SHARE * motor.rated_torque_nm
-            place.board.set(BRAKE, load_nm)
+            try:
+                place.board.set(BRAKE, load_nm)
+            except BoardError as error:
+                raise UserError(str(error), "LOAD", "choose a load within that") from None
             bench.pause(SETTLE_S)
         frequencies, model, speed_rpm = bench.frequencies(loop), model_of(loop, bench, motor), bench.speed_rpm()
         found: list[Point] = []
@@ -215,8 +219,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = command_line.Parser(prog="python3 -m tools.live.response_command", description=__doc__.splitlines()[0])
     command_common.add_options(parser, "response", without=("library", "quiet"))
     parser.add_argument("--loop", choices=response.LOOPS, help="one of the two; default both, with --port the speed loop")
-    parser.add_argument("--speed", type=float, metavar="RPM", help=f"of the motor; default {SPEED_SHARE:.0%} of the rated one")
-    parser.add_argument("--load", type=float, metavar="NM", help=f"on the virtual board; default {LOAD_SHARE:.0%} of the rated torque")
+    parser.add_argument("--speed", type=_number, metavar="RPM", help=f"of the motor; default {SPEED_SHARE:.0%} of the rated one")
+    parser.add_argument("--load", type=_number, metavar="NM", help=f"on the virtual board; default {LOAD_SHARE:.0%} of the rated torque")
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     parser.add_argument("--cpu", choices=("host", "33f"), default="host", help="33f: an image of XC16 in the instruction-set simulator")
     parser.add_argument("--port", help="serial port of a real board, whose firmware has SCOPE 1")
@@ -225,7 +229,28 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _number(text: str) -> float:
+    """A finite one."""
+    with contextlib.suppress(ValueError):
+        if math.isfinite(number := float(text)):
+            return number
+    raise argparse.ArgumentTypeError(f"'{text}' is no number")
+
+
+def _refuse(options: argparse.Namespace) -> None:
+    """What does not go together, and would be left out in silence."""
+    if options.speed == 0.0:
+        raise UserError("0 rpm", "SPEED", "name the speed at which the motor turns, or leave it out")
+    if options.load is not None and options.port:
+        raise UserError("only the virtual board has a brake", "LOAD", "load the motor at your board by hand, and leave it out")
+    if options.cpu == "33f" and options.port:
+        raise UserError("a board has its own processor", "CPU", "leave out CPU or PORT")
+    if options.loop == "current" and not options.port and (options.speed is not None or options.load is not None):
+        raise UserError("the current loop is measured at END_SPEED_RPM without load", "SPEED, LOAD", "leave them out")
+
+
 def _run(options: argparse.Namespace) -> int:
+    _refuse(options)
     asked = [options.loop] if options.loop else ["speed"] if options.port else list(response.LOOPS)
     results: list[Result] = []
     answers: list[step.Answer] = []

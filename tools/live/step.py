@@ -24,7 +24,7 @@ SETTLED = {"current": 0.1, "speed": 0.1, "load": 0.02}
 QUARTER = 16384
 REST_S, UNLOADED_S = 0.5, 1.0
 LEFT_STEPS = 100
-"""Of 0.4 ms, that the current's step lasts."""
+"""Slow steps that the current's step lasts."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def current(bench: Bench) -> tuple[np.ndarray, np.ndarray]:
     """Times since the step, and the q current as a share of it."""
     firmware, names = bench.firmware, [f"{SINE}.left", f"{RUN}.control.i_q13.q", f"{RUN}.control.ref_q13.q", f"{RUN}.control.i_q13.d"]
     size, records = round(8.0 * CURRENT_SHARE * bench.params["MAXIMUM_CURRENT_A"] / bench.params["COUNT_CURRENT_A"]), []
-    for name, value in (("left", 0), ("step", 0), ("angle", QUARTER), ("size_q", size), ("size_rho_q17", 0)):
+    for name, value in (("left", 0), ("step", 0), ("angle", QUARTER), ("size_iq_q16", size), ("size_rho_q17", 0)):
         firmware.put(f"{SINE}.{name}", value)
     left = firmware.of(f"{SINE}.left")
     rows = firmware.link.scope_state().size // (2 * len(names))
@@ -85,7 +85,7 @@ def current(bench: Bench) -> tuple[np.ndarray, np.ndarray]:
         while firmware.link.scope_state().running:
             bench.pause(POLL_S)
         record = np.array(firmware.link.scope_read(), dtype=float)
-        bench.pause(LEFT_STEPS * 8.0 * bench.period_s)
+        bench.pause(LEFT_STEPS * bench.slow_s)
         records.append((record[:, 1] - record[:before - 1, 1].mean()) / (size / 8.0))
     shortest = min(map(len, records))
     return (np.arange(shortest) - before) * bench.period_s, np.mean([record[:shortest] for record in records], axis=0)

@@ -188,7 +188,7 @@ INLINE QM_WRAPS dq_t mode_asked(drive_run_t *run, const drive_params_t *p)
     sine_t *s = &run->sine;
     if (s->left != 0u) {
         s->angle = (angle_t)(s->angle + s->step);
-        asked.q = qm_limit((int16_t)(asked.q + (qm_mulhi(s->size_q, sine_coarse(s->angle)) >> 2)), p->current_max_q13);
+        asked.q = qm_limit((int16_t)(asked.q + (qm_mulhi(s->size_iq_q16, sine_coarse(s->angle)) >> 2)), p->current_max_q13);
     }
 #else
     (void)p;

@@ -53,7 +53,7 @@ typedef struct {
     uint16_t left;        /**< slow steps until it ends, of SLOW_PERIODS; 0: there is none */
     angle_t step;         /**< of a period, 65536 = one turn */
     angle_t angle;        /**< in this period */
-    int16_t size_q;       /**< peak beside the q current asked for, an eighth of a count of Q13; both together stay within the largest current */
+    int16_t size_iq_q16;  /**< peak beside the q current asked for, of full scale; both together stay within the largest current */
     int16_t size_rho_q17; /**< peak beside the estimator's angle, turns: at most a quarter */
 } sine_t;
 #define SINE_STATE sine_t sine;
