@@ -11,9 +11,10 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from tools.common import paths
+from tools.common import motor_file, paths
 from tools.common.errors import UserError
 from tools.live import response, response_command, response_model, step
+from tuning import loops
 
 COMMAND = [sys.executable, "-m", "tools.live.response_command"]
 
@@ -68,6 +69,33 @@ def test_what_cannot_be_measured_is_told_in_one_line(tmp_path, arguments, says):
     told = [line for line in done.stderr.splitlines() if line.startswith("foc33: ")]
     assert done.returncode == 2 and len(told) == 1 and says in told[0]
     assert not (tmp_path / "result").exists()
+
+
+PLANT = loops.Plant(0.5, 1e-3, 1e-3, 0.01, 4, 1e-5)
+GAINS = loops.Gains(6.0, 6.0, 0.16, 0.0, 0.0, 0.06, 5e-5)
+
+
+def test_q_axis_loop_is_what_both_axes_together_leave_of_it():
+    omega_e = 2500.0
+    for hz in (150.0, 600.0, 2500.0):
+        there, back = loops.current_loop(np.array([hz, -hz]), PLANT, GAINS, omega_e)
+        along, across = 0.5 * (there + np.conj(back)), -0.5j * (there - np.conj(back))
+        opened = np.array([[along, -across], [across, along]]) # d and q
+        closed = np.linalg.solve(np.eye(2) + opened, opened)[1, 1]
+        assert response_model.of_q_current(np.array([hz]), PLANT, GAINS, omega_e)[0] == pytest.approx(closed / (1.0 - closed), rel=1e-9)
+
+
+@pytest.mark.parametrize(("state", "inductance"), [("CLOSED", "lq_h"), ("RAMP", "ld_h")])
+def test_along_the_forced_current_lies_the_inductance_of_the_d_axis(state, inductance):
+    motor = motor_file.load("ipm_4pp_24v_2000")
+    params = {"NOPOLESPAIRS": 4.0, "MOTOR_LS_MH": 2.2, "MOTOR_SALIENCY_UH": 1100.0, "MOTOR_KPHI_V_PER_KRPM": 7.255, "MOTOR_RS_OHM": 0.8, "MOTOR_INERTIA_KGM2": 1.6e-5,
+              "COUNT_SPEED_RPM": 0.25, "COUNT_CURRENT_A": 5e-4, "COUNT_VOLTAGE_V": 8e-4, "CURRENT_KP_D": 6.9, "CURRENT_KP_Q": 13.8, "CURRENT_KI": 0.25}
+    bench = mock.Mock(params=params, period_s=5e-5)
+    bench.firmware.symbols.variables, bench.firmware.get.return_value = {}, 1000
+    bench.state.return_value, bench.speed_rpm.return_value = state, 500.0
+    hz = 1000.0 # the winding is all inductance, and a period is short
+    found = response_model.model_of("current", bench, motor)(np.array([hz]))[0]
+    assert abs(found) == pytest.approx(13.8 / (2.0 * np.pi * hz * getattr(motor, inductance)), rel=0.03)
 
 
 def test_a_loop_whose_gain_never_crosses_one_has_shown_no_margin():
