@@ -38,7 +38,7 @@ warnings += -Wno-sign-conversion # the checks that the compiler inserts make it 
 sanitizer := -fsanitize=undefined,address -fno-sanitize-recover=all -fno-omit-frame-pointer
 endif
 # Messages do not follow a macro's expansion: a wrong parameter is named once, not with the chain of macros that uses it.
-# What a build compiles anew, firmware and tests, at -O1: in half the time, and the virtual board runs no slower. The board itself, compiled once, at -O2.
+# What a build compiles anew, firmware and tests, at -O1: in half the time, and the virtual board runs no slower. The board itself, compiled once, at -O3.
 CFLAGS := -std=gnu99 -O1 -g -fPIC -fno-semantic-interposition -ftrack-macro-expansion=0 $(sanitizer)
 INCLUDES = $(if $(USERPARAMS),-I$B/header -I$(call quoted,$(USERPARAMS))) -Itools/cpu_host -Iinclude -I.
 compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) $(INCLUDES) $(DEFINES) $(app_wishes)
@@ -315,7 +315,7 @@ $B/params: $B/flags $(params_source) $(params_tools)
 	$(params) $(compile)
 
 $(board_objects): private INCLUDES += $(board_includes)
-$(board_objects): private CFLAGS += -O2
+$(board_objects): private CFLAGS += -O3
 
 ifeq ($(own_way),)
 board_compile = $(CC) $(CFLAGS) $(warnings) $(if $(WERROR),-Werror) -Itools/cpu_host -Iinclude -I. $(board_includes)

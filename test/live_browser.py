@@ -94,6 +94,21 @@ def resized(page: Page, width: int, height: int = 800) -> None:
     page.run("return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
+SEEN = pytest.mark.parametrize("on, width", [(False, 1280), (True, 390)], ids=["light", "dark phone"])
+"""As a page is looked at for accessible()."""
+
+
+def accessible(page: Page, root, on: bool, width: int | None = None, prepare=lambda: None) -> None:
+    """Nothing breaks a rule of accessibility, in these colours and this width, after what prepares the page."""
+    dark(page, on)
+    if width is not None:
+        resized(page, width)
+    prepare()
+    holding, breaks = page.axe(root)
+    dark(page, False)
+    assert breaks == [] and holding > 10
+
+
 def inside(page: Page, script: str, *arguments):
     """Runs it where the page's own names are known, and no frame of the board comes between."""
     return page.run(f"return window.eval({script!r})", *arguments)

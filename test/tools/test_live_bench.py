@@ -248,3 +248,9 @@ def test_csv_has_a_row_a_millisecond_and_the_last_two_minutes():
     for minute in range(5):
         board.recording.add_rows(np.array([60.0 * minute, 60.0 * minute + 59.0]), np.zeros((2, len(board.recording.signals))))
     assert [times[0] for times, _ in board.recording.rows][0] == 120.0
+
+
+def test_what_is_recorded_keeps_no_more_than_its_rows():
+    board = started(0.5)
+    for times, rows in board.recording.rows:
+        assert times.base is None and rows.base is None # parts of a 20 kHz trace would keep the whole

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from live_browser import CONTROLS, PLACES, SIZE, Page, dark, inside, overlapping, resized
+from live_browser import CONTROLS, PLACES, SEEN, SIZE, Page, accessible, dark, inside, overlapping, resized
 from live_support import Living, known, parts, served, until
 
 from tools.live import page as page_text
@@ -142,15 +142,12 @@ def test_in_the_dark_the_page_and_its_curves_are_dark(page):
         assert label == ("rgb(163, 173, 183)" if on else "rgb(91, 101, 112)")
 
 
-@pytest.mark.parametrize("on, width", [(False, 1280), (True, 390)], ids=["light", "dark phone"])
+@SEEN
 def test_axe_finds_nothing_that_keeps_somebody_from_using_the_page(page, pytestconfig, on, width):
     traced(page)
     scope_open(page)
-    dark(page, on)
-    resized(page, width)
-    found = page.axe(pytestconfig.rootpath.parent)
+    accessible(page, pytestconfig.rootpath.parent, on, width)
     scope_open(page, False)
-    assert found[1] == [] and found[0] > 10
 
 
 # ---- curves --------------------------------------------------------------------------------------------------------------------

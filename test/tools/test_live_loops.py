@@ -8,7 +8,7 @@ import itertools
 import time
 
 import pytest
-from live_browser import PLACES, Page, dark, inside, overlapping, resized
+from live_browser import PLACES, SEEN, Page, accessible, dark, inside, overlapping, resized
 from live_support import Living, kept_parts, known, parts, recorder_parts, served, until
 from support import refusal
 
@@ -327,14 +327,9 @@ def test_the_plot_and_the_tables_say_what_was_measured(page):
     assert y[0] == pytest.approx(y[1], abs=0.1)
 
 
-@pytest.mark.parametrize("on, width", [(False, 1280), (True, 390)], ids=["light", "dark phone"])
+@SEEN
 def test_axe_finds_nothing_in_the_panel(page, pytestconfig, on, width):
-    dark(page, on)
-    resized(page, width)
-    inside(page, WHOLE)
-    found = page.axe(pytestconfig.rootpath.parent)
-    dark(page, False)
-    assert found[1] == [] and found[0] > 10
+    accessible(page, pytestconfig.rootpath.parent, on, width, lambda: inside(page, WHOLE))
 
 
 def test_a_board_without_the_sine_shows_no_panel(chromium):

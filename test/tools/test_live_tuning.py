@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from live_browser import SIZE, Page
+from live_browser import SIZE, Page, accessible
 from live_support import KEPT_DEFINES, kept_parts, parts, served, until
 from support import refusal
 
@@ -355,13 +355,10 @@ def test_the_board_goes_on_while_the_compiler_works(page):
 
 @pytest.mark.parametrize("on", [False, True], ids=["light", "dark"])
 def test_axe_finds_nothing_with_changed_and_refused_values(page, pytestconfig, on):
-    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark" if on else "light"}]})
     typed(page, "MAXIMUM_SPEED_RPM", "5000")
     waits(page, "document.getElementById('tuning-text').textContent.startsWith('unsaved')", "not changed")
     page.run("window.eval('views.tuning.set({ ...views.tuning.told, lost: true, foreign: 3 })')")
-    found = page.axe(pytestconfig.rootpath.parent)
-    page.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "light"}]})
-    assert found[1] == [] and found[0] > 10
+    accessible(page, pytestconfig.rootpath.parent, on)
 
 
 @pytest.mark.parametrize("width", [360, SIZE[0], 2560])

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -237,9 +238,11 @@ def blocked() -> str:
 
 def real_time(again: Callable[[], dict] | None = None) -> str:
     """No figure of this machine: what holds on any is that the promise is kept. What else it does slows even processor time, so the best of a few runs
-    counts. `again`: runs the demo once more and returns its summary."""
+    counts, over two minutes if need be. `again`: runs the demo once more and returns its summary."""
     best = 0.0
     for number in range(REAL_TIME_RUNS):
+        if number >= REAL_TIME_RUNS // 2:
+            time.sleep(REAL_TIME_PAUSE_S)
         run = (again or demo_again)() if number else result("demo")
         best = max(best, run["motor_seconds"] / run["cpu_seconds"])
         if best >= 20.0:
@@ -247,7 +250,9 @@ def real_time(again: Callable[[], dict] | None = None) -> str:
     return f"{best:.0f} times"
 
 
-REAL_TIME_RUNS = 12
+REAL_TIME_RUNS = 24
+REAL_TIME_PAUSE_S = 10.0
+"""Before each run of the second half."""
 
 
 def demo_again() -> dict:

@@ -53,8 +53,8 @@ class Recording:
     rows: deque[tuple[np.ndarray, np.ndarray]] = field(default_factory=deque)
 
     def add_rows(self, times: np.ndarray, rows: np.ndarray) -> None:
-        """More of the trace; what is too old goes."""
-        self.rows.append((times, rows))
+        """More of the trace; what is too old goes. Copied: a part of an array would keep the whole."""
+        self.rows.append((np.array(times), np.array(rows)))
         while self.rows[0][0][-1] < times[-1] - LONGEST_S:
             self.rows.popleft()
 
