@@ -472,7 +472,7 @@ static uint16_t special_of(uint16_t byte)
 }
 
 /** A byte counts in the sum. */
-static void count_byte(lnet_t *l, uint16_t byte)
+static NOINLINE void count_byte(lnet_t *l, uint16_t byte)
 {
     l->sum = (uint16_t)(l->sum + byte);
     l->special = special_of(byte);

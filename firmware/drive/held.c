@@ -42,10 +42,23 @@ static NOINLINE int16_t held_less(int16_t a, int16_t b)
     return qm_sub_limited(a, b);
 }
 
-/** How far the back-EMF has moved. */
+/** Within the format. */
+static NOINLINE int16_t held_limited(int32_t sum)
+{
+    return (int16_t)((sum > 32767) ? 32767 : (sum < -32767) ? -32767
+                                                            : sum);
+}
+
+/** |a - b|. */
+QM_INLINE QM_WRAPS uint16_t held_apart(int16_t a, int16_t b)
+{
+    return (uint16_t)((a > b) ? (uint16_t)a - (uint16_t)b : (uint16_t)b - (uint16_t)a);
+}
+
+/** How far the back-EMF has moved: its parts fit half the format. */
 static uint16_t held_moved(dq_t emf, dq_t from)
 {
-    return (uint16_t)((uint16_t)qm_abs(held_less(emf.d, from.d)) + (uint16_t)qm_abs(held_less(emf.q, from.q)));
+    return (uint16_t)(held_apart(emf.d, from.d) + held_apart(emf.q, from.q));
 }
 
 /** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
@@ -74,6 +87,18 @@ static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uin
     const int32_t turned = qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps);
     return (int16_t)((turned > HELD_QUARTER) ? HELD_QUARTER : (turned < -HELD_QUARTER) ? -HELD_QUARTER
                                                                                        : turned);
+}
+
+/** What a rotor has turned by in so many steps that is as fast as the back-EMF said when it was asked. */
+static NOINLINE int16_t held_as_asked(const drive_run_t *run, const drive_params_t *p, uint16_t steps)
+{
+    return held_turned(p, held_speed(run, run->held.emf_q12), steps);
+}
+
+/** What it has turned by, by the sum of its back-EMF, a quarter turn at most. */
+static int16_t held_by_sum(const drive_run_t *run, const drive_params_t *p)
+{
+    return held_turned(p, held_omega(run, run->held.turned_q12), 1);
 }
 
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12)
@@ -125,7 +150,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
     shaft->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
-    shaft->stopped_steps = 0;
+    shaft->turned_q12 = 0;
     held_turn_back(d, p, lead);
     held_enter(shaft, HELD_SETTLES);
     d->run.model.inv_kfi = 0;
@@ -146,44 +171,50 @@ static void held_go_on(drive_t *d, const drive_params_t *p, speed_erpm_t omega_e
     run->held.lag_q12 = 0;
 }
 
-/** It has turned all the time, as fast as the back-EMF says of the question's begin and of now. */
+/** It has turned all the time: as fast as when it was asked, and by what the back-EMF gained since. */
 static void held_has_turned(drive_t *d, const drive_params_t *p, dq_t emf)
 {
-    const speed_erpm_t first_erpm = held_speed(&d->run, d->run.held.emf_q12), now_erpm = held_speed(&d->run, emf);
-    held_turn_back(d, p, (int16_t)-held_turned(p, qm_mean(first_erpm, now_erpm), d->run.held.stopped_steps));
-    held_go_on(d, p, now_erpm, d->run.observer.load_q16);
+    held_t *shaft = &d->run.held;
+    const int32_t sum = shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience));
+    shaft->turned_q12 = held_limited(sum);
+    held_turn_back(d, p, (int16_t)-held_by_sum(&d->run, p));
+    held_go_on(d, p, held_speed(&d->run, emf), d->run.observer.load_q16);
 }
 
-/** It stood, and turns now. The load is that of before; where that was too little before, what flows. */
+/** It stood, and turns now. */
 static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     drive_run_t *run = &d->run;
     held_t *shaft = &run->held;
-    const int32_t load_q16 = (shaft->stood > 1u) ? run->observer.load_q16 : (int32_t)shaft->load * 65536;
+    const int32_t load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : run->observer.load_q16;
+    held_turn_back(d, p, (int16_t)-held_by_sum(run, p));
     shaft->stood = 2;
     held_go_on(d, p, held_speed(run, emf), load_q16);
 }
 
 /** Half of what the back-EMF's d part would have changed by, of a rotor as fast as the back-EMF says. */
-static uint16_t held_half_turned(const held_t *shaft, const drive_run_t *run, const drive_params_t *p)
+static uint16_t held_half_turned(const drive_run_t *run, const drive_params_t *p)
 {
-    const int16_t angle = held_turned(p, held_speed(run, shaft->emf_q12), shaft->steps);
-    return (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, angle))); /* pi, nearly */
+    return (uint16_t)(3 * qm_abs(qm_mulhi(run->held.emf_q12.q, held_as_asked(run, p, run->held.steps)))); /* pi, nearly */
 }
 
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
- *  that changes then was let go, or so slow that the frame is not far off. */
+ *  that changes then was let go, or is so slow that its turn by itself is known. */
 static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
 {
     held_t *shaft = &d->run.held;
     const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1; /* dead time shakes it by as much */
-    const uint16_t half = held_half_turned(shaft, &d->run, p), tells = (uint16_t)(half > least);
+    const uint16_t half = held_half_turned(&d->run, p), tells = (uint16_t)(half > least);
     const int16_t turned = held_less(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
+    const uint16_t turns = (uint16_t)(shaft->steps > 1u && turned > (int16_t)(tells ? half : least));
 
-    if (moved > 2u * most || (shaft->steps > 1u && turned > (int16_t)(tells ? half : least))) {
-        held_will(shaft, (tells || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
+    if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
+        held_will(shaft, ((turns && tells) || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
     } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && shaft->steps >= HELD_ASK_STEPS)) {
         held_will(shaft, HELD_LEARN);
+    } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */
+        shaft->emf_q12 = emf;
+        shaft->turned_q12 = 0;
     } else { /* it may turn slowly */
     }
 }
@@ -208,7 +239,7 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
-            shaft->run_on = held_turned(p, held_speed(run, emf), (uint16_t)(shaft->doubted_steps + 1u));
+            shaft->run_on = held_as_asked(run, p, (uint16_t)(shaft->doubted_steps + 1u));
             held_will(shaft, HELD_TURN_BACK);
         }
         run->adaptation.rs_q31 = (int32_t)held_rs(&p->adaptation, qm_hi(run->adaptation.rs_q31), share) * 65536;
@@ -227,8 +258,7 @@ static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
     const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
     const int32_t lag = (int32_t)shaft->lag_q12 - (shaft->lag_q12 >> HELD_LAG_SHIFT) + shaft->emf_q12.q - emf.q - taken_back;
-    shaft->lag_q12 = (int16_t)((lag > 32767) ? 32767 : (lag < -32767) ? -32767
-                                                                      : lag);
+    shaft->lag_q12 = held_limited(lag);
 }
 
 /** 1 where a rotor that was asked is back at its speed, or may be asked again. */
@@ -265,14 +295,19 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
+    const int16_t base_q12 = (int16_t)((shaft->phase == (uint16_t)HELD_SETTLES) ? 0 : shaft->emf_q12.q);
 
-    shaft->stopped_steps++;
+    shaft->turned_q12 = held_less(shaft->turned_q12, held_less(base_q12, emf.q));
     switch (shaft->phase) {
     case HELD_SETTLES:
         if (moved <= most >> 1) {
+            shaft->patience = shaft->steps;
+            shaft->turned_q12 = 0;
             held_enter(shaft, HELD_ASKED);
         } else if (shaft->steps > shaft->patience) {
             held_will(shaft, HELD_HAS_TURNED);
+            emf.d = 0; /* all of it is in the sum */
+            emf.q = 0;
         } else { /* the current changes */
         }
         shaft->emf_q12 = emf;
@@ -283,6 +318,11 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
         if (shaft->act == (uint16_t)HELD_WAITS && moved > most) { /* the frame is turned back first */
             held_will(shaft, HELD_GOES_ON);
         } else { /* the load is what flows, and it grows */
+            shaft->turned_q12 = 0;
+            if (shaft->act == (uint16_t)HELD_WAITS && shaft->steps <= HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) {
+                shaft->run_on = along_direction(d, -HELD_PULL_ANGLE);
+                held_will(shaft, HELD_TURN_BACK);
+            }
             observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
         }
         break;
@@ -323,7 +363,11 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
         held_has_turned(d, p, emf);
         shaft->emf_q12 = emf;
         break;
-    case HELD_LEARN: held_learn(d, p, emf); break;
+    case HELD_LEARN:
+        if (held_moved(emf, shaft->emf_q12) <= (uint16_t)p->adaptation.emf_least_q12 >> 1) { /* it was not let go while this waited */
+            held_learn(d, p, emf);
+        }
+        break;
     case HELD_TURN_BACK: held_turn_back(d, p, shaft->run_on); break;
     case HELD_GOES_ON:
         held_turns_again(d, p, emf);

@@ -155,7 +155,7 @@ current_q13_t limits_apply_braking(const drive_control_t *c, speed_erpm_t speed,
 }
 
 /** 1 from 1/32 below the limit on: field weakening's trim keeps the voltage a little below it. @param limit 0 or more */
-static uint16_t limits_reached(int16_t x, int16_t limit)
+static NOINLINE uint16_t limits_reached(int16_t x, int16_t limit)
 {
     return (uint16_t)(qm_abs(x) >= (int16_t)(limit - (limit >> 5)));
 }

@@ -87,7 +87,7 @@ static void signals_gather(signals_evidence_t *e, const drive_t *d, uint16_t une
 }
 
 /** How much of the sum turns with its pointer. @return 1 to 1.4 times that */
-static uint32_t signals_beat(const signals_beat_t *sum)
+static NOINLINE uint32_t signals_beat(const signals_beat_t *sum)
 {
     return (uint32_t)((sum->cosine < 0) ? -sum->cosine : sum->cosine) + (uint32_t)((sum->sine < 0) ? -sum->sine : sum->sine);
 }

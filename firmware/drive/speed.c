@@ -80,15 +80,15 @@ current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, spe
 
 uint16_t speed_swings(const drive_run_t *run)
 {
-    return (uint16_t)(run->control.swing_steps > 2u * SPEED_SWING_STEPS);
+    return (uint16_t)(run->control.swing_steps > 3u * SPEED_SWING_STEPS);
 }
 
 /** Takes a step of the trim into the memory of swings. @param swings 1: the error is as large as a swing's */
 static void speed_remember_swing(drive_control_t *c, int16_t error, uint16_t swings)
 {
-    if (swings && (error ^ c->swung_erpm) < 0) {
+    if (swings && (c->swing_steps & SPEED_SWING_MASK) == 0u && (error ^ c->swung_erpm) < 0) {
         c->swung_erpm = error;
-        c->swing_steps = (uint16_t)((c->swing_steps < 3u * SPEED_SWING_STEPS) ? c->swing_steps + SPEED_SWING_STEPS : c->swing_steps);
+        c->swing_steps = (uint16_t)((c->swing_steps < 4u * SPEED_SWING_STEPS) ? c->swing_steps + SPEED_SWING_STEPS : c->swing_steps);
     } else if (c->swing_steps != 0u) {
         c->swing_steps--;
     } else { /* as a rule */

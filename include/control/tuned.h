@@ -41,7 +41,8 @@
 #define SPEED_TRIM_MOST_SHIFT 3     /* [shift] an eighth of the largest current at most | lowspeed */
 #define SPEED_TRIM_ERROR_SHIFT 3    /* [shift] an error beyond an eighth of the speed is no rest | loadsteps */
 #define SPEED_SWING_SHIFT 4         /* [shift] one beyond a sixteenth is a swing | pulse */
-#define SPEED_SWING_STEPS 150u      /* [steps] of 16 periods, 0.12 s at 20 kHz, that a swing to either side is remembered | pulse */
+#define SPEED_SWING_STEPS 152u      /* [steps] of 16 periods, 0.12 s at 20 kHz, that a swing to either side is remembered: a multiple of the following | pulse */
+#define SPEED_SWING_MASK 7u         /* [steps] less one: only so often is the error looked at, for a rotor that was nearly lost swings faster | loadsteps */
 
 /* ---- Field weakening and d current ---- */
 #define FIELDWEAK_TRIM_STEP 4       /* [Q13 A] d current that the voltage feedback gives back every 16 periods | run SCENARIO=demo */
@@ -124,6 +125,9 @@
 #define HELD_LAG_SHIFT 4      /* [shift] of what the back-EMF's filter is behind 1/16 is forgotten a step | held */
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
 #define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
+#define HELD_TURNED_DEG 10.0  /* [deg] by its back-EMF's change, electrical: so far no shaft that is held goes | loadsteps */
+#define HELD_PULL_ANGLE 91    /* [2^-16 turn] half a degree a step, by which all of the current pulls a rotor that stands | loadsteps */
+#define HELD_PULL_STEPS 64u   /* [steps] 32 degrees: a load may have stopped it so far ahead of the frame | loadsteps */
 #define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */
 #define HELD_ASK_MOST_STEPS 32u /* [steps] of 16 periods, for a back-EMF too small to tell sooner | lowspeed */
 #define HELD_SLOW_STEPS 64u    /* [steps] of 16 periods, in which the heaviest rotor that was let go is faster than what follows | held */

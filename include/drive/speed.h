@@ -30,8 +30,8 @@ current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, spe
  *  @param before_erpm the reference 16 periods ago @param iq_q13 the q current that is asked for */
 void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_erpm, current_q13_t iq_q13);
 
-/** 1 while the speed swings about its reference, as under a load that pulses with the shaft: it was far off to the other side some times, less than
- *  SPEED_SWING_STEPS apart in the mean. A load step is one or two such times; slower swings are the loop's own, with far more inertia than the header's. */
+/** 1 while the speed swings about its reference, as under a load that pulses with the shaft: it was far off to the other side four times, less than
+ *  SPEED_SWING_STEPS apart in the mean. A load step is up to three such times; slower swings are the loop's own, with far more inertia than the header's. */
 uint16_t speed_swings(const drive_run_t *run);
 
 /** The same step by step: what a step leaves below a whole count goes to the next, for a count can turn a light rotor out of its speed. */

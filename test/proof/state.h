@@ -40,7 +40,7 @@ static void any_held(held_t *h, held_phase_t phase)
     h->steps = ANYU16();
     h->doubts = ANYU16();
     h->doubted_steps = ANYU16();
-    h->stopped_steps = ANYU16();
+    h->turned_q12 = any(-32767, 32767);
     h->patience = ANYU16();
     h->stood = any_u(0, 2);
     h->emf_q12.d = any((int16_t)-emf_dq_max, emf_dq_max);
@@ -188,6 +188,7 @@ static void held_holds_again(const held_t *h)
     //@ check held_emf_q: -emf_dq_max <= h->emf_q12.q <= emf_dq_max;
     //@ check held_lag: -32767 <= h->lag_q12 && 0 <= h->inv_kfi && 0 <= h->emf_sum_max_q12;
     //@ check held_run_on: -16384 <= h->run_on <= 16384;
+    //@ check held_turned: -32767 <= h->turned_q12;
     //@ check held_load: -params.observer.load_max - 1 <= h->load <= params.observer.load_max;
 }
 

@@ -181,6 +181,12 @@ void test_what_the_estimator_took_back_by_itself_is_no_lag(void)
 
 /* ---- does it stand? ---- */
 
+/** What an electrical rpm turns in a step, angle counts. */
+static float counts_per_erpm(void)
+{
+    return 16.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 65536.0F;
+}
+
 void test_a_back_emf_that_stands_still_is_resistance_and_turns_the_frame_back_by_what_it_had_turned(void)
 {
     static const int16_t more_q12[] = { 0, 40, 400, 1000, -400, -1000 }; /* of 4000 */
@@ -228,7 +234,7 @@ void test_resistance_that_has_risen_rises_to_its_bound_and_not_beyond(void)
 void test_a_speed_that_swings_is_asked_later(void)
 {
     at(1, FAST_ERPM, 1500, 0, 400);
-    drive.run.control.swing_steps = 2u * SPEED_SWING_STEPS + 1u;
+    drive.run.control.swing_steps = 3u * SPEED_SWING_STEPS + 1u;
     steps(HELD_DOUBTS_SWINGS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase);
     steps(1);
@@ -256,11 +262,10 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
         }
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
         ahead = (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped);
-        { /* the mean speed of the first and the last back-EMF, 400 and 395 more what turned into the d axis */
+        { /* three steps with the first back-EMF, 400, two of them with 5 less; the last is 395 more what turned into the d axis */
             const dq_t last = estimator_emf(&drive.run.estimator);
             const float erpm_per_q12 = (float)shaft->inv_kfi / 2048.0F, now_erpm = (395.0F + (float)qm_abs(last.d)) * erpm_per_q12;
-            const float mean_erpm = (400.0F * erpm_per_q12 + now_erpm) / 2.0F;
-            TEST_ASSERT_INT16_WITHIN(60, (int16_t)((float)direction * 3.0F * per_step * mean_erpm / 1500.0F), ahead);
+            TEST_ASSERT_INT16_WITHIN(20, (int16_t)((float)direction * per_step * (3.0F * 400.0F - 2.0F * 5.0F) * erpm_per_q12 / 1500.0F), ahead);
             TEST_ASSERT_INT16_WITHIN(10, (int16_t)((float)direction * now_erpm), observer_speed(&drive.run.observer));
         }
         TEST_ASSERT_EQUAL_INT32(load_q16, drive.run.observer.load_q16);
@@ -319,18 +324,20 @@ void test_a_back_emf_that_turns_backwards_is_no_rotor_that_turns_forwards(void)
     }
 }
 
-void test_a_back_emf_that_changes_late_in_a_long_question_turns_no_frame(void)
+void test_a_back_emf_that_changes_late_in_a_long_question_turns_the_frame_by_what_it_gained_alone(void)
 {
+    const int16_t gains_q12 = (int16_t)(3 * params.adaptation.emf_least_q12);
     EACH_DIRECTION(direction) {
         angle_t stopped;
         asked(direction, 20);
         steps(1u + HELD_ASK_MOST_STEPS / 2u);
         TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
         stopped = estimator_next_angle(&drive.run.estimator);
-        rig_emf(0, (int16_t)(direction * (3 * params.adaptation.emf_least_q12)));
+        rig_emf(0, (int16_t)(direction * (20 + gains_q12)));
         steps(1);
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
-        TEST_ASSERT_EQUAL_UINT16(stopped, estimator_next_angle(&drive.run.estimator));
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)((float)(direction * gains_q12) * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm()),
+                                 (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped));
         TEST_ASSERT_GREATER_THAN_INT16(100, (int16_t)(direction * observer_speed(&drive.run.observer)));
     }
 }
@@ -433,6 +440,87 @@ void test_a_rotor_that_turns_again_takes_the_load_of_before_and_the_second_time_
         lets_go(direction);
         TEST_ASSERT_INT16_WITHIN(2, drive.run.control.ref_q13.q, observer_load(&drive.run.observer, &params.observer));
     }
+}
+
+void test_a_rotor_that_turns_slowly_in_a_long_question_turns_again_after_ten_degrees_along_with_the_load_that_was_seen(void)
+{
+    const int16_t gains_q12 = (int16_t)(params.adaptation.emf_least_q12 / 2); /* what dead time may shake it by */
+    EACH_DIRECTION(direction) {
+        const uint16_t expected = (uint16_t)(params.adaptation.turned_q12 / gains_q12) + 1u;
+        angle_t stopped;
+        uint16_t count = 0;
+        int16_t ahead;
+        TEST_ASSERT_LESS_THAN_UINT16(HELD_ASK_MOST_STEPS - 2u * HELD_ASK_STEPS, expected);
+        asked(direction, 20);
+        shaft->load = 0;
+        drive.run.observer.load_q16 = (int32_t)direction * 700 * 65536;
+        steps(1u + 2u * HELD_ASK_STEPS);
+        stopped = estimator_next_angle(&drive.run.estimator);
+        rig_emf(0, (int16_t)(direction * (20 + gains_q12)));
+        while (shaft->phase == (uint16_t)HELD_ASKED && count < 100u) {
+            steps(1);
+            count++;
+        }
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_EQUAL_UINT16(expected, count);
+        ahead = (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped);
+        TEST_ASSERT_INT16_WITHIN(3, (int16_t)((float)(direction * (int16_t)count * gains_q12) * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm()), ahead);
+        TEST_ASSERT_INT16_WITHIN(180, (int16_t)(direction * 1820), ahead); /* the flux is the header's */
+        TEST_ASSERT_EQUAL_INT16((int16_t)(direction * 700), qm_hi(drive.run.observer.load_q16));
+        asked(direction, (int16_t)(20 + gains_q12));
+        steps(1u + 2u * HELD_ASK_STEPS);
+        rig_emf(0, (int16_t)(direction * 20)); /* against the direction it does not go */
+        (void)answered();
+    }
+}
+
+void test_the_tail_of_the_filter_is_no_turn_of_a_rotor(void)
+{
+    const int16_t gains_q12 = (int16_t)(params.adaptation.emf_least_q12 / 2);
+    asked(1, 20);
+    steps(2);
+    rig_emf((int16_t)-gains_q12, (int16_t)(20 + gains_q12));
+    steps(2u * HELD_ASK_STEPS - 1u);
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    TEST_ASSERT_EQUAL_INT16(20 + gains_q12, shaft->emf_q12.q);
+    rig_emf((int16_t)(-2 * gains_q12 + 8), (int16_t)(20 + gains_q12));
+    (void)answered();
+}
+
+/** How far the frame turns in so many steps, along the direction. */
+static int16_t pulled(int16_t direction, uint16_t count)
+{
+    const angle_t before = estimator_next_angle(&drive.run.estimator);
+    steps(count);
+    return (int16_t)(direction * (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - before));
+}
+
+void test_all_of_the_current_pulls_a_rotor_that_stands_ahead_of_the_frame_and_no_further_than_half_a_right_angle(void)
+{
+    EACH_DIRECTION(direction) {
+        stands(direction, 0);
+        drive.run.control.iq_limit_q13 = (int16_t)(qm_abs(drive.run.control.ref_q13.q) + 1);
+        TEST_ASSERT_EQUAL_INT16(0, pulled(direction, 4));
+        drive.run.control.iq_limit_q13 = qm_abs(drive.run.control.ref_q13.q);
+        TEST_ASSERT_EQUAL_INT16(4 * HELD_PULL_ANGLE, pulled(direction, 4));
+        TEST_ASSERT_INT16_WITHIN(HELD_PULL_ANGLE, (int16_t)(HELD_PULL_STEPS - 9u) * HELD_PULL_ANGLE, pulled(direction, 500));
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+    }
+}
+
+void test_a_rotor_that_is_let_go_while_the_answer_waits_teaches_no_resistance(void)
+{
+    asked(1, 40);
+    shaft->phase = (uint16_t)HELD_ASKED;
+    shaft->act = (uint16_t)HELD_LEARN;
+    rig_emf(0, (int16_t)(40 + params.adaptation.emf_least_q12 / 2 + 1));
+    held_act(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+    shaft->act = (uint16_t)HELD_LEARN;
+    rig_emf(0, (int16_t)(40 + params.adaptation.emf_least_q12 / 2));
+    held_act(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
 }
 
 void test_a_rotor_whose_resistance_is_known_is_held_again_only_without_back_emf_until_it_is_fast(void)

@@ -211,7 +211,7 @@ void test_at_rest_the_trim_goes_by_the_observer_s_speed_and_the_gain_in_use_and_
     EACH_DIRECTION(sign) {
         rig_closed(1, 10000);
         TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 100), trim_after_at(256, (int16_t)(10000 - sign * 100), (int16_t)(10000 - sign * 50)));
-        drive.run.control.swing_steps = 3u * SPEED_SWING_STEPS;
+        drive.run.control.swing_steps = 4u * SPEED_SWING_STEPS;
         TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 300), trim_after_at(128, (int16_t)(10000 + sign * 100), (int16_t)(10000 - sign * 200)));
     }
 }
@@ -223,8 +223,8 @@ void test_a_load_step_is_no_swing_and_neither_are_small_errors_or_one_side(void)
         int16_t low_erpm, high_erpm;
         uint16_t swings, steps;
     } cases[] = {
-        { "two large errors", 5000, 15000, 2, 100 },    { "small errors", 9376, 10624, 50, 10 },   { "one side", 5000, 8000, 50, 10 },
-        { "one side that counts", 9000, 10600, 50, 10 }, { "slow swings", 5000, 15000, 50, 400 },
+        { "three large errors", 5000, 15000, 3, 100 },   { "small errors", 9376, 10624, 50, 10 }, { "one side", 5000, 8000, 50, 10 },
+        { "one side that counts", 9000, 10600, 50, 10 }, { "slow swings", 5000, 15000, 50, 400 }, { "a frame that is asked for", 5000, 15000, 9, 3 },
     };
     EACH(n, cases) {
         rig_closed(1, 10000);
@@ -242,9 +242,9 @@ void test_swings_are_forgotten_in_an_eighth_of_a_second_and_not_remembered_for_l
         (void)trim_after(1, 10000);
         steps++;
     }
-    TEST_ASSERT_EQUAL_UINT16(2u * SPEED_SWING_STEPS, drive.run.control.swing_steps);
+    TEST_ASSERT_EQUAL_UINT16(3u * SPEED_SWING_STEPS, drive.run.control.swing_steps);
     TEST_ASSERT_UINT16_WITHIN(15, SPEED_SWING_STEPS, steps);
-    (void)trim_after(4u * SPEED_SWING_STEPS, 10000);
+    (void)trim_after(5u * SPEED_SWING_STEPS, 10000);
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.control.swing_steps);
 }
 

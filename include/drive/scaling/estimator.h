@@ -77,11 +77,14 @@
     }
 
 /* ---- What the running motor teaches ---- */
+/** The sum is the flux times the angle, E dt = psi d theta. With psi of the header. */
+#define PARAM_TURNED_V (PARAM_F(MOTOR_KPHI_V_PER_KRPM) / PARAM_SQRT3 / (1000.0F * 2.0F * PARAM_PI / 60.0F * PARAM_F(NOPOLESPAIRS)) * PARAM_F(HELD_TURNED_DEG) * PARAM_PI / 180.0F / (2.0F * PARAM_STEP_SEC))
 #define PARAM_ADAPTATION_INIT \
     { \
         .rate_q16 = (int16_t)(PARAM_F(ADAPTATION_RATE) * (float)SLOW_ROUND_STEPS * PARAM_STEP_SEC * 65536.0F + 0.5F), \
         .kfi_least = PARAM_Q15(-ADAPTATION_KFI_LESS), .kfi_most = PARAM_Q15(ADAPTATION_KFI_MORE), .rs_least = PARAM_Q15(-ADAPTATION_RS_LESS), .rs_most = PARAM_Q15(PARAM_RS_RISES), \
         .emf_least_q12 = (int16_t)(PARAM_F(ADAPTATION_EMF_SHARE) * PARAM_DEAD_TIME_V / NORM_VOLTAGE_CONST / 8.0F), \
+        .turned_q12 = (int16_t)PARAM_MIN(32767.0F, PARAM_TURNED_V / NORM_VOLTAGE_CONST / 8.0F), \
         .rs_base_q16 = PARAM_SCALED(PARAM_RS_FULL, PARAM_RS_EXP) \
     }
 

@@ -1,0 +1,40 @@
+"""Motors with light rotors, whose rotor a load step stops within milliseconds, or a hand: they are found and go on, none is called a stall."""
+
+import argparse
+
+import pytest
+
+from tools.bench import build, command_common, held_sweep, loadsteps
+from tools.bench.held_sweep import Case
+from tools.common import board_file, motor_file, paths
+from tuning import design, header
+
+TRINAMIC, IPM = "trinamic_qbl4208_41_04_006", "ipm_4pp_24v_2000"
+
+
+def sweep(kind, module, name, folder):
+    values = motor_file.load(name)
+    (folder / build.HEADER).write_text(header.write(design.design(values, board_file.load("mclv"))), encoding="utf-8")
+    table = module.Table.read(paths.TABLES / f"{kind.name}.toml")
+    options = argparse.Namespace(motor=name, board="mclv", userparams=str(folder), library=None)
+    motor, board, library, _ = command_common.set_up(table, options, [])
+    return kind(table.for_motor(values, library.params), motor, board, library)
+
+
+@pytest.mark.parametrize("name", [TRINAMIC, IPM])
+def test_a_rotor_that_a_load_step_stops_is_back_whatever_its_flux(name, tmp_path):
+    steps = sweep(loadsteps.LoadSteps, loadsteps, name, tmp_path)
+    lowest = min(steps.table.speeds_rpm)
+    rows = steps.run([item for item in steps.cases() if item.rpm == lowest], name)
+    assert len(rows) == 9 and max(row["dip_percent"] for row in rows) > 95.0
+    assert {row["name"] + f", Kphi x{row['kphi']:g}": row["verdict"] for row in rows if row["verdict"] != "ok"} == {}
+
+
+@pytest.mark.parametrize("name, item", [
+    (TRINAMIC, Case(400.0, 0.0, 1.0, 0.03, 90.0)), # let go while the answer waits
+    (TRINAMIC, Case(400.0, 0.0, 9.0, 0.2, 180.0)),
+    (IPM, Case(400.0, 0.0725, 36.0, 0.01, 90.0))], ids=str)
+def test_a_shaft_that_is_let_go_is_not_thrown_backwards(name, item, tmp_path):
+    held = sweep(held_sweep.Held, held_sweep, name, tmp_path)
+    row, = held.run([item], name)
+    assert [outcome.got for outcome in held.check(item, row) if not outcome.ok] == [] and row["backwards_rpm"] <= held.most_back_rpm
