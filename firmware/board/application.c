@@ -48,7 +48,7 @@ static void application_operated(app_told_t *told, uint16_t elapsed_ms)
 }
 
 /** Temperatures, of the sensors that there are. */
-static void application_tell_heat(app_told_t *told)
+static void application_tell_heat(app_told_t *told UNUSED)
 {
 #if MOTOR_NTC_USED
     told->motor_q4 = board_drive.heat.motor.celsius_q4;
@@ -56,7 +56,6 @@ static void application_tell_heat(app_told_t *told)
 #if BRIDGE_NTC_USED
     told->bridge_q4 = board_drive.heat.bridge.celsius_q4;
 #endif
-    (void)told;
 }
 
 /** What the application is told of the drive, and what stands. */

@@ -9,9 +9,8 @@
 #include "drive/speed.h"
 
 /** A step of the start; in closed loop the load observer's. */
-static void observe_load(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void observe_load(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     mode_sine_step(&d->run);
     if (drive_is_closed(d)) {
         handover_observe(&d->run, p);
@@ -21,9 +20,8 @@ static void observe_load(drive_t *d, const drive_params_t *p, const drive_sample
 }
 
 /** The speed controller's step. */
-static void control_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void control_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     speed_step(d, p);
 }
 
@@ -36,9 +34,8 @@ static void step_beside_closed(drive_t *d, const drive_params_t *p)
 }
 
 /** Where a state leads to the next by what the rotor does, and what follows for a rotor that may be held. */
-static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     if (d->run.held.act != (uint16_t)HELD_WAITS && drive_is_closed(d)) {
         held_act(d, p);
     } else {
@@ -47,9 +44,8 @@ static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_
 }
 
 /** As step_state(); in closed loop: may the rotor stand? */
-static void ask_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void ask_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     if (drive_is_closed(d)) {
         held_step(d, p);
     }
@@ -67,16 +63,14 @@ static void follow_bus(drive_t *d, const drive_params_t *p, const drive_samples_
 }
 
 /** The voltage circle at the filtered bus. */
-static void limit_voltage(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void limit_voltage(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     bus_update_voltage_limit(d, p);
 }
 
 /** What is left of the hand-over decays; the references of d and q current, and their limits. */
-static void limit_currents(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void limit_currents(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     if (d->run.handover.offset != 0) {
         handover_decay(&d->run.handover);
     }
@@ -94,16 +88,14 @@ static void limit_and_learn(drive_t *d, const drive_params_t *p, const drive_sam
 }
 
 /** The observer's rate, the controller's gain, the current that the samples miss. */
-static void follow_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void follow_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     speed_follow(&d->run, p);
 }
 
 /** Once signals seem wrong, they are looked at in every such slot, and judged. */
-static void watch_signals(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void watch_signals(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     if (d->run.observer.wrong_steps != 0u) {
         signals_check(d, p);
         signals_judge(d, p);
@@ -111,24 +103,21 @@ static void watch_signals(drive_t *d, const drive_params_t *p, const drive_sampl
 }
 
 /** Does the rotor stand? */
-static void probe_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void probe_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     protection_probe_rotor(d, p);
 }
 
 /** Does the run go on? */
-static void choose_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void choose_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     speed_choose_state(d, p);
 }
 
 /* wcet: speed_load_moves_against excludes speed_schedule */
 /** The speed's error at rest; stall and lost lock. While the innovation gate is open the gains follow here, too, and the trim does not look at the load's way. */
-static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     speed_trim_step(d, p);
     protection_check_rotor(d, p);
     if (!observer_gate_is_closed(&d->run.observer)) {
@@ -137,9 +126,8 @@ static void trim_speed(drive_t *d, const drive_params_t *p, const drive_samples_
 }
 
 /** The estimator's sign, and the signals while they seem wrong. */
-static void follow_estimate(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void follow_estimate(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     estimator_follow(&d->run.estimator, &p->estimator);
     if (drive_is_closed(d) && d->run.observer.wrong_steps != 0u) {
         signals_check(d, p);
@@ -147,9 +135,8 @@ static void follow_estimate(drive_t *d, const drive_params_t *p, const drive_sam
 }
 
 /** Do signals and motor fit each other? Then the motor's constants at this speed. */
-static void update_model(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void update_model(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     if (drive_is_closed(d)) {
         if (d->run.observer.wrong_steps == 0u) { /* else watch_signals() has it */
             signals_check(d, p);
@@ -161,9 +148,8 @@ static void update_model(drive_t *d, const drive_params_t *p, const drive_sample
 }
 
 /** Can the motor be what it has shown? */
-static void check_model(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
+static void check_model(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
-    (void)raw;
     protection_check_model(d, p);
 }
 

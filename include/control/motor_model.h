@@ -17,7 +17,7 @@ typedef struct {
     q15_t kfi_least, kfi_most; /**< bounds of the change of 1/Kphi */
     q15_t rs_least, rs_most;   /**< and of R, above -1 */
     int16_t emf_least_q12;     /**< no information below, at least 1 */
-    int16_t turned_q12;        /**< what the back-EMF of a rotor that turns by HELD_TURNED_DEG sums to, a step of 16 periods each */
+    int16_t turned_q12;        /**< what the back-EMF of a rotor that turns by HELD_TURNED_RAD sums to, a step of 16 periods each */
     uint16_t rs_base_q16;      /**< R of the header, see motor_model_t */
 } adaptation_params_t;
 

@@ -15,6 +15,8 @@
 #endif
 /** Called, so that it takes no registers from the main path. */
 #define NOINLINE __attribute__((noinline))
+/** Of a parameter that some builds do not use. */
+#define UNUSED __attribute__((unused))
 
 /** Number formats. A name such as i_q13 means 2^13 counts for full scale; full scale is NORM_CURRENT's I0*32768 for a
  *  current, and U0*32768 = Vbus_nominal/sqrt(3)*(1-dead time) for a voltage. Guard bits make saturation unnecessary. */

@@ -125,7 +125,7 @@
 #define HELD_LAG_SHIFT 4      /* [shift] of what the back-EMF's filter is behind 1/16 is forgotten a step | held */
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
 #define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
-#define HELD_TURNED_DEG 10.0  /* [deg] by its back-EMF's change, electrical: so far no shaft that is held goes | loadsteps */
+#define HELD_TURNED_RAD 0.175 /* [rad] ten degrees, electrical, by what its back-EMF gained: so far no shaft that is held goes | loadsteps */
 #define HELD_PULL_ANGLE 91    /* [2^-16 turn] half a degree a step, by which all of the current pulls a rotor that stands | loadsteps */
 #define HELD_PULL_STEPS 64u   /* [steps] 32 degrees: a load may have stopped it so far ahead of the frame | loadsteps */
 #define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */

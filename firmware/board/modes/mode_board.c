@@ -9,12 +9,11 @@
 
 #include <xc.h>
 
-char *mode_status_line(char *line, const drive_t *d)
+char *mode_status_line(char *line, const drive_t *d UNUSED)
 {
 #ifdef IDENTIFY
     return identify_status_line(line, d);
 #else
-    (void)d;
     return line;
 #endif
 }
@@ -33,14 +32,12 @@ static void profile_watch(const profile_t *f)
 }
 #endif
 
-void mode_watch(const drive_t *d)
+void mode_watch(const drive_t *d UNUSED)
 {
 #ifdef IDENTIFY
     identify_watch(d);
 #elif defined TORQUE_PROFILE
     profile_watch(&d->run.profile);
-#else
-    (void)d;
 #endif
 }
 
@@ -100,13 +97,12 @@ void identify_watch(const drive_t *d)
 }
 #endif
 
-uint16_t mode_speaks(char **end)
+uint16_t mode_speaks(char **end UNUSED)
 {
 #ifdef BRINGUP
     *end = bringup_line(*end);
     return 1;
 #else
-    (void)end;
     return 0;
 #endif
 }
@@ -283,7 +279,7 @@ void mode_panel_init(void)
 #endif
 }
 
-uint16_t mode_panel(uint16_t elapsed_ms)
+uint16_t mode_panel(uint16_t elapsed_ms UNUSED)
 {
 #ifdef BRINGUP
     const buttons_t in = { BOARD_S2_DOWN(), BOARD_S3_DOWN(), elapsed_ms };
@@ -292,7 +288,6 @@ uint16_t mode_panel(uint16_t elapsed_ms)
     BOARD_SWITCH(BOARD_LED_RUN, lights.led_run);
     return 1;
 #else
-    (void)elapsed_ms;
     return 0;
 #endif
 }

@@ -76,13 +76,12 @@ void bringup_turn(bringup_run_t *t)
     t->angle = (angle_t)(t->turn_q32 >> 16);
 }
 
-void bringup_run(drive_t *d, const drive_params_t *p, duties_t *duty)
+void bringup_run(drive_t *d, const drive_params_t *p UNUSED, duties_t *duty)
 {
     bringup_run_t *t = &d->run.bringup;
     uint16_t settled = bringup_step_amplitude(d);
     dq_t vector;
     phases_t part;
-    (void)p;
     if (settled) {
         bringup_turn(t);
     }
@@ -101,19 +100,16 @@ void bringup_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     }
 }
 
-void bringup_start(drive_t *d, const drive_params_t *p)
+void bringup_start(drive_t *d, const drive_params_t *p UNUSED)
 {
-    (void)p;
     d->run.bringup.ready = 1;
 }
 #endif
 
-void mode_idle(drive_t *d)
+void mode_idle(drive_t *d UNUSED)
 {
 #ifdef BRINGUP
     bringup_add(d, 1);
-#else
-    (void)d;
 #endif
 }
 

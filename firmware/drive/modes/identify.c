@@ -1198,13 +1198,11 @@ void identify_run(drive_t *d, const drive_params_t *p, duties_t *duty)
 
 #endif
 
-uint16_t mode_background(drive_t *d, const drive_params_t *p)
+uint16_t mode_background(drive_t *d UNUSED, const drive_params_t *p UNUSED)
 {
 #ifdef IDENTIFY
     return identify_background(d, p);
 #else
-    (void)d;
-    (void)p;
     return 0;
 #endif
 }

@@ -5,15 +5,12 @@
 #include "drive/limits.h"
 #include "drive/speed.h"
 
-void mode_start(drive_t *d, const drive_params_t *p)
+void mode_start(drive_t *d UNUSED, const drive_params_t *p UNUSED)
 {
 #if defined IDENTIFY
     identify_start(d, p);
 #elif defined BRINGUP
     bringup_start(d, p);
-#else
-    (void)d;
-    (void)p;
 #endif
 }
 
@@ -38,7 +35,7 @@ speed_erpm_t mode_speed_target(const drive_t *d, const drive_params_t *p)
 #endif
 }
 
-uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
+uint16_t mode_reference_step(drive_t *d UNUSED, const drive_params_t *p UNUSED)
 {
 #ifdef TUNING
     if (d->state == (uint16_t)DRIVE_STOPPING) {
@@ -47,46 +44,37 @@ uint16_t mode_reference_step(drive_t *d, const drive_params_t *p)
     reference_step(d, p, mode_speed_target(d, p), p->tuning_step_q16);
     return 1;
 #else
-    (void)d;
-    (void)p;
     return 0;
 #endif
 }
 
 #ifndef TORQUE_PROFILE
-void mode_profile_step(drive_t *d, const drive_params_t *p)
+void mode_profile_step(drive_t *d UNUSED, const drive_params_t *p UNUSED)
 {
-    (void)d;
-    (void)p;
 }
 #endif
 
-void mode_profile_follow(drive_run_t *run, const drive_params_t *p)
+void mode_profile_follow(drive_run_t *run UNUSED, const drive_params_t *p UNUSED)
 {
 #ifdef TORQUE_PROFILE
     profile_follow(&run->profile, &p->profile, observer_speed(&run->observer));
-#else
-    (void)run;
-    (void)p;
 #endif
 }
 
-current_q13_t mode_profile_current(const drive_run_t *run)
+current_q13_t mode_profile_current(const drive_run_t *run UNUSED)
 {
 #ifdef TORQUE_PROFILE
     return run->profile.now_q13;
 #else
-    (void)run;
     return 0;
 #endif
 }
 
-int32_t mode_profile_current_q26(const drive_run_t *run)
+int32_t mode_profile_current_q26(const drive_run_t *run UNUSED)
 {
 #ifdef TORQUE_PROFILE
     return qm_mulss(run->profile.now_q13, 8192);
 #else
-    (void)run;
     return 0;
 #endif
 }
@@ -106,11 +94,10 @@ uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction)
 #endif
 }
 
-mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range)
+mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range UNUSED)
 {
     mode_range_t range;
 #ifdef TORQUE_MODE
-    (void)fast_range;
     range.low = MODE_TWO_DIRECTIONS || (DIRECTION_INPUT_USED); /* never 0 then: the sign is the direction */
     range.high = p->current_max_q13;
 #else
@@ -121,17 +108,16 @@ mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range)
     return range;
 }
 
-uint16_t mode_commands_current(const drive_t *d)
+uint16_t mode_commands_current(const drive_t *d UNUSED)
 {
 #ifdef TORQUE_MODE
     return (uint16_t)(d->state == (uint16_t)DRIVE_CLOSED);
 #else
-    (void)d;
     return 0;
 #endif
 }
 
-uint16_t mode_current_step(drive_t *d, const drive_params_t *p, current_q13_t *iq_q13)
+uint16_t mode_current_step(drive_t *d UNUSED, const drive_params_t *p UNUSED, current_q13_t *iq_q13)
 {
 #ifdef TORQUE_MODE
     drive_run_t *run = &d->run;
@@ -148,14 +134,12 @@ uint16_t mode_current_step(drive_t *d, const drive_params_t *p, current_q13_t *i
     *iq_q13 = along_direction(d, iq);
     return 1;
 #else
-    (void)d;
-    (void)p;
     *iq_q13 = 0;
     return 0;
 #endif
 }
 
-uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t *reasons)
+uint16_t mode_limit_reasons(const drive_t *d UNUSED, const drive_params_t *p UNUSED, uint16_t *reasons)
 {
 #ifdef TORQUE_MODE
     int16_t asked = qm_clamp(qm_abs(d->command.target_erpm), 0, d->run.control.iq_limit_q13);
@@ -164,8 +148,6 @@ uint16_t mode_limit_reasons(const drive_t *d, const drive_params_t *p, uint16_t 
     *reasons = (uint16_t)((qm_abs(missing) > (p->current_max_q13 >> 6)) ? LIMIT_SPEED_RANGE : LIMIT_NONE);
     return mode_commands_current(d);
 #else
-    (void)d;
-    (void)p;
     *reasons = (uint16_t)LIMIT_NONE;
     return 0;
 #endif
@@ -181,7 +163,7 @@ static INLINE q15_t sine_coarse(angle_t angle)
 }
 #endif
 
-INLINE QM_WRAPS dq_t mode_asked(drive_run_t *run, const drive_params_t *p)
+INLINE QM_WRAPS dq_t mode_asked(drive_run_t *run, const drive_params_t *p UNUSED)
 {
     dq_t asked = run->control.ref_q13;
 #if SCOPE
@@ -190,20 +172,16 @@ INLINE QM_WRAPS dq_t mode_asked(drive_run_t *run, const drive_params_t *p)
         s->angle = (angle_t)(s->angle + s->step);
         asked.q = qm_limit((int16_t)(asked.q + (qm_mulhi(s->size_iq_q16, sine_coarse(s->angle)) >> 2)), p->current_max_q13);
     }
-#else
-    (void)p;
 #endif
     return asked;
 }
 
-void mode_sine_step(drive_run_t *run)
+void mode_sine_step(drive_run_t *run UNUSED)
 {
 #if SCOPE
     if (run->sine.left != 0u) {
         run->sine.left--;
     }
-#else
-    (void)run;
 #endif
 }
 
