@@ -318,6 +318,7 @@ void test_adaptation(void)
     EXACT(p.rs_least, GOLDEN_PARAMS_ADAPTATION_RS_LEAST);
     EXACT(p.rs_most, GOLDEN_PARAMS_ADAPTATION_RS_MOST);
     EXACT(p.emf_least_q12, GOLDEN_PARAMS_ADAPTATION_EMF_LEAST_Q12);
+    EXACT(p.turned_q12, GOLDEN_PARAMS_ADAPTATION_TURNED_Q12);
 }
 
 void test_with_a_high_trip_level_resistance_and_derivative_share_the_back_emf_s_format(void)
