@@ -137,6 +137,7 @@ static void observer(void)
     FIELD(adaptation.rs_least, -0.4, "1", 1.0 / 32768.0, "Q15", "least change of R");
     FIELD(adaptation.rs_most, PARAM_RS_RISES, "1", 1.0 / 32768.0, "Q15", "largest");
     FIELD(adaptation.emf_least_q12, 0.2 * PARAM_DEAD_TIME_V, "V", 8.0 * volt, "Q12 V", "back-EMF from which it learns");
+    FIELD(adaptation.turned_q12, PARAM_TURNED_V, "V", 8.0 * volt, "Q12 V", "back-EMFs of 16 periods that are a turn by HELD_TURNED_RAD");
     FIELD(sample_shift_q16, 60 * 25e-9 / (PARAM_ERPM_PER_V * MOTOR_LS_MH * 0.001) * pairs, "A/rpm", q13_a / erpm / 65536.0, "Q16 Q13 A/erpm",
           "q current that the sample misses");
     FIELD(fieldweak.esdq_per_erpm_q13, PARAM_ESDQ_RATIO / 60.0 * pairs, "Hz/rpm", 1.0 / (2.0 * PI * period * 65536.0 * 8192.0) / erpm, "Q13 of Q16",

@@ -320,13 +320,14 @@ def test_csv_is_what_is_shown_with_the_reference_beside_it(page, chromium):
 
 
 def test_png_shows_curves_numbers_and_cursors(page, chromium):
+    parts = [".graph", ".legend", ".dygraph-axis-label-y", ".dygraph-axis-label-x", "th[scope=row]", "td:nth-child(2)", "th[scope=col]"]
     draw(page, i_A=SINE, v_V=SINE)
     page.click("#scope-cursors")
-    size, inked = inside(page, """(() => { const c = views.scope.picture(), all = by("scope-view").getBoundingClientRect();
+    page.wait(f"return {parts}.every((one) => document.querySelector('#scope-view ' + one))", "not all is drawn")
+    size, inked = inside(page, f"const parts = {parts};" """(() => { const c = views.scope.picture(), all = by("scope-view").getBoundingClientRect();
         const ink = (part) => { const r = part.getBoundingClientRect(), at = (p) => Math.round(2 * (p + 10));
             const data = c.getContext("2d").getImageData(at(r.left - all.left), at(r.top - all.top), Math.round(2 * r.width), Math.round(2 * r.height)).data;
             return data.filter((v, n) => n % 4 === 0 && v < 200).length; };
-        const parts = [".graph", ".legend", ".dygraph-axis-label-y", ".dygraph-axis-label-x", "th[scope=row]", "td:nth-child(2)", "th[scope=col]"];
         return [[c.width, c.height], parts.map((one) => ink(document.querySelector("#scope-view " + one)))]; })()""")
     assert min(inked) > 20, inked
     page.click("#scope-png")

@@ -28,7 +28,7 @@ def golden(rs: float, ls_mh: float, kphi: float, pairs: int, amperes: float, mos
             "pi_q.kp": PI2 * hz * ls_mh * 1e-3 * ratio / 16.0 * 32768.0, "pi_q.ki": PI2 * hz * rs * 50e-6 * ratio * 2048.0}
 
 
-CUT_OFF = ("PARAM_BRAKE_COUNTS", "voltage_limit_per_bus_q16", "duty_per_volt_numerator", "speed_kp_fast_q13", "adaptation.emf_least_q12",
+CUT_OFF = ("PARAM_BRAKE_COUNTS", "voltage_limit_per_bus_q16", "duty_per_volt_numerator", "speed_kp_fast_q13", "adaptation.emf_least_q12", "adaptation.turned_q12",
            "svm.dead_slope_q8")
 """Constants that the firmware cuts off; those of the observer are others."""
 
