@@ -297,6 +297,11 @@ def test_the_reference_outlives_a_lost_connection(page):
 
 
 # ---- files -------------------------------------------------------------------------------------------------------------------
+def press(page: Page, selector: str) -> None:
+    """A click that no layout under way can move away from its button."""
+    page.run("document.querySelector(arguments[0]).click()", selector)
+
+
 def saved(chromium, name: str) -> bytes:
     file = chromium[1] / name
     until(file.exists, "no file")
@@ -305,16 +310,16 @@ def saved(chromium, name: str) -> bytes:
 
 def test_csv_is_what_is_shown_with_the_reference_beside_it(page, chromium):
     draw(page, i_A=SINE)
-    page.click("#scope-keep")
+    press(page, "#scope-keep")
     draw(page, i_A=2.0 * SINE, v_V=TIMES)
-    page.click("#scope-csv")
+    press(page, "#scope-csv")
     head, *rows = csv.reader(saved(chromium, "scope.csv").decode("utf-8").splitlines())
     assert head == ["time_s", "i_A [A]", "v_V [V]", "reference time_s", "reference i_A [A]"]
     assert np.array(rows, float) == pytest.approx(np.column_stack((TIMES, 2.0 * SINE, TIMES, TIMES, SINE)), rel=1e-5, abs=1e-12)
-    page.click("#scope-keep")
-    page.click("#scope-fft")
+    press(page, "#scope-keep")
+    press(page, "#scope-fft")
     (chromium[1] / "scope.csv").unlink()
-    page.click("#scope-csv")
+    press(page, "#scope-csv")
     head, *rows = csv.reader(saved(chromium, "scope.csv").decode("utf-8").splitlines())
     assert head == ["frequency_hz", "i_A [A]", "v_V [V]"] and len(rows) == 201 and float(rows[-1][0]) == pytest.approx(5000.0)
 
@@ -322,7 +327,7 @@ def test_csv_is_what_is_shown_with_the_reference_beside_it(page, chromium):
 def test_png_shows_curves_numbers_and_cursors(page, chromium):
     parts = [".graph", ".legend", ".dygraph-axis-label-y", ".dygraph-axis-label-x", "th[scope=row]", "td:nth-child(2)", "th[scope=col]"]
     draw(page, i_A=SINE, v_V=SINE)
-    page.click("#scope-cursors")
+    press(page, "#scope-cursors")
     page.wait(f"return {parts}.every((one) => document.querySelector('#scope-view ' + one))", "not all is drawn")
     size, inked = inside(page, f"const parts = {parts};" """(() => { const c = views.scope.picture(), all = by("scope-view").getBoundingClientRect();
         const ink = (part) => { const r = part.getBoundingClientRect(), at = (p) => Math.round(2 * (p + 10));
@@ -330,7 +335,7 @@ def test_png_shows_curves_numbers_and_cursors(page, chromium):
             return data.filter((v, n) => n % 4 === 0 && v < 200).length; };
         return [[c.width, c.height], parts.map((one) => ink(document.querySelector("#scope-view " + one)))]; })()""")
     assert min(inked) > 20, inked
-    page.click("#scope-png")
+    press(page, "#scope-png")
     data = saved(chromium, "scope.png")
     assert data[:8] == b"\x89PNG\r\n\x1a\n" and [int.from_bytes(data[n:n + 4], "big") for n in (16, 20)] == size
 
