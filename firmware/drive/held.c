@@ -306,9 +306,8 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
             held_enter(shaft, HELD_ASKED);
         } else if (shaft->steps > shaft->patience) {
             held_will(shaft, HELD_HAS_TURNED);
-            emf.d = 0; /* all of it is in the sum */
-            emf.q = 0;
-        } else { /* the current changes */
+            emf.q = 0; /* all of it is in the sum */
+        } else {       /* the current changes */
         }
         shaft->emf_q12 = emf;
         break;

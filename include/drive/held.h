@@ -36,9 +36,9 @@ typedef struct {
     uint16_t steps;          /**< in the phase */
     uint16_t doubts;         /**< steps that look like a held rotor; a rotor far below its reference counts three */
     uint16_t doubted_steps;  /**< since then */
-    int16_t turned_q12;      /**< sum of the back-EMF's q part since the angle stands; from HELD_ASKED on of what it gained. It is the angle turned */
+    int16_t turned_q12;      /**< sum of the back-EMF's q part, a step each, since the angle stands; from HELD_ASKED on of what it gained: flux times the angle turned */
     uint16_t patience;       /**< steps that the back-EMF has to settle; from HELD_ASKED on those that it took */
-    uint16_t stood;          /**< 1 it has stood since it was as fast as it should be, so R is known */
+    uint16_t stood;          /**< since the rotor was as fast as it should be: 1 it has stood, so R is known; 2 and has turned again */
     dq_t emf_q12;            /**< filtered back-EMF of the last step; of an older one from HELD_ASKED on */
     int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind */
     int16_t inv_kfi;         /**< of the model when the angle stopped */

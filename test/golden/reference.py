@@ -346,7 +346,8 @@ class Machine:
         return {
             "rate_q16": nearest(6 * 32 * self.period_s * WORD), "kfi_least": q15(-0.3), "kfi_most": q15(0.35), "rs_least": q15(-0.4),
             "rs_most": q15(clamp(self.rs_end - 1, 0, 0.6)), "emf_least_q12": int(0.2 * self.bus_v * self.dead_time_s / self.period_s / self.u0 / 8),
-            "turned_q12": int(min(0.175 * self.psi / (16 * self.period_s) / self.u0 / 8, 32767)), "rs_base_q16": e["rs_q16"],
+            "turned_q12": int(min(max(0.175 * self.psi / 16, 0.4 * self.bus_v * self.dead_time_s) / self.period_s / self.u0 / 8, 32767)),
+            "rs_base_q16": e["rs_q16"],
         }
 
     def modulator(self):

@@ -187,6 +187,12 @@ static float counts_per_erpm(void)
     return 16.0F * PARAM_F(LOOPTIME_SEC) / 60.0F * 65536.0F;
 }
 
+/** The angle that a sum of back-EMFs is, along the direction. */
+static int16_t angle_of(int32_t sum_q12)
+{
+    return (int16_t)((float)sum_q12 * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm());
+}
+
 void test_a_back_emf_that_stands_still_is_resistance_and_turns_the_frame_back_by_what_it_had_turned(void)
 {
     static const int16_t more_q12[] = { 0, 40, 400, 1000, -400, -1000 }; /* of 4000 */
@@ -464,13 +470,96 @@ void test_a_rotor_that_turns_slowly_in_a_long_question_turns_again_after_ten_deg
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
         TEST_ASSERT_EQUAL_UINT16(expected, count);
         ahead = (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped);
-        TEST_ASSERT_INT16_WITHIN(3, (int16_t)((float)(direction * (int16_t)count * gains_q12) * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm()), ahead);
+        TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * angle_of((int16_t)count * gains_q12)), ahead);
         TEST_ASSERT_INT16_WITHIN(180, (int16_t)(direction * 1820), ahead); /* the flux is the header's */
         TEST_ASSERT_EQUAL_INT16((int16_t)(direction * 700), qm_hi(drive.run.observer.load_q16));
         asked(direction, (int16_t)(20 + gains_q12));
         steps(1u + 2u * HELD_ASK_STEPS);
         rig_emf(0, (int16_t)(direction * 20)); /* against the direction it does not go */
         (void)answered();
+    }
+}
+
+void test_a_back_emf_that_does_not_settle_turns_the_frame_by_its_sum_and_nothing_of_a_question_before_counts(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t stopped;
+        int32_t sum_q12 = 0;
+        at(direction, FAST_ERPM, 100, 0, 100);
+        shaft->turned_q12 = 5000;
+        steps(HELD_DOUBTS_MOST / HELD_DOUBTS_FAR + 1u);
+        TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+        stopped = estimator_next_angle(&drive.run.estimator);
+        for (int16_t n = 0; held_angle_stands(shaft) && n < 20; n++) {
+            const int16_t q_q12 = (int16_t)(100 + 10 * n);
+            rig_emf((n & 1) ? 300 : -300, (int16_t)(direction * q_q12));
+            sum_q12 += q_q12;
+            steps(1);
+        }
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_INT16_WITHIN(4, (int16_t)(direction * angle_of(sum_q12)), (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped));
+    }
+}
+
+void test_a_sum_beyond_the_format_turns_the_frame_along_by_no_more_than_the_fastest_rotor_would(void)
+{
+    EACH_DIRECTION(direction) {
+        int16_t ahead[2];
+        for (uint16_t n = 0; n < 2u; n++) {
+            angle_t stopped;
+            asked(direction, 40);
+            stopped = estimator_next_angle(&drive.run.estimator);
+            shaft->phase = (uint16_t)HELD_ASKED;
+            shaft->steps = 3;
+            shaft->patience = 1;
+            shaft->emf_q12.q = (int16_t)(direction * ((n == 0u) ? 8000 : 16000)); /* 64000 wraps to less than nothing */
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
+            held_act(&drive, &params);
+            ahead[n] = (int16_t)(direction * (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped));
+        }
+        TEST_ASSERT_GREATER_THAN_INT16(1000, ahead[0]);
+        TEST_ASSERT_EQUAL_INT16(ahead[0], ahead[1]);
+    }
+}
+
+void test_late_in_a_question_only_a_back_emf_that_turned_by_what_it_said_had_turned_all_the_time(void)
+{
+    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8); /* than dead time shakes it by */
+    uint16_t count;
+    asked(1, 40); /* too little to tell: it turns, or was let go */
+    steps(1u + HELD_ASK_STEPS + 1u);
+    rig_emf((int16_t)-more, 40);
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    TEST_ASSERT_EQUAL_UINT16(2, shaft->stood);
+    asked(1, 150); /* tells in this step */
+    count = answered();
+    TEST_ASSERT_GREATER_THAN_UINT16(1u + HELD_ASK_STEPS, count);
+    asked(1, 150);
+    steps((uint16_t)(count - 1u));
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    rig_emf(0, (int16_t)(150 + 3 * params.adaptation.emf_least_q12));
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    TEST_ASSERT_EQUAL_UINT16(2, shaft->stood);
+}
+
+void test_what_r_i_is_off_while_a_rotor_stands_for_long_turns_no_frame_when_it_is_let_go(void)
+{
+    const int16_t off_q12 = (int16_t)(params.adaptation.emf_least_q12 / 2);
+    EACH_DIRECTION(direction) {
+        angle_t stood;
+        stands(direction, 0);
+        drive.run.control.iq_limit_q13 = 32767;
+        rig_emf(0, (int16_t)(direction * off_q12));
+        steps(200);
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+        stood = estimator_next_angle(&drive.run.estimator);
+        rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 1)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(direction * angle_of(params.adaptation.emf_least_q12 + 1)),
+                                 (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stood));
     }
 }
 
@@ -483,6 +572,7 @@ void test_the_tail_of_the_filter_is_no_turn_of_a_rotor(void)
     steps(2u * HELD_ASK_STEPS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
     TEST_ASSERT_EQUAL_INT16(20 + gains_q12, shaft->emf_q12.q);
+    TEST_ASSERT_EQUAL_INT16(0, shaft->turned_q12);
     rig_emf((int16_t)(-2 * gains_q12 + 8), (int16_t)(20 + gains_q12));
     (void)answered();
 }

@@ -321,6 +321,20 @@ void test_adaptation(void)
     EXACT(p.turned_q12, GOLDEN_PARAMS_ADAPTATION_TURNED_Q12);
 }
 
+void test_a_turn_of_a_rotor_with_little_flux_is_more_than_what_dead_time_may_shake_and_one_with_much_has_the_format(void)
+{
+#undef MOTOR_KPHI_V_PER_KRPM
+#define MOTOR_KPHI_V_PER_KRPM 0.5
+    static const adaptation_params_t little = PARAM_ADAPTATION_INIT;
+#undef MOTOR_KPHI_V_PER_KRPM
+#define MOTOR_KPHI_V_PER_KRPM 900.0
+    static const adaptation_params_t much = PARAM_ADAPTATION_INIT;
+    NEAR(little.turned_q12, 2 * GOLDEN_PARAMS_ADAPTATION_EMF_LEAST_Q12, 1);
+    EXACT(much.turned_q12, INT16_MAX);
+#undef MOTOR_KPHI_V_PER_KRPM
+#define MOTOR_KPHI_V_PER_KRPM 7.24
+}
+
 void test_with_a_high_trip_level_resistance_and_derivative_share_the_back_emf_s_format(void)
 {
 #undef OVER_CURRENT_THRESHOLD_A
