@@ -279,6 +279,7 @@
  *   adaptation.rs_least                  -0.4 1              -13107  Q15                         -0.002 %  least change of R
  *   adaptation.rs_most                    0.6 1               19660  Q15                         -0.004 %  largest
  *   adaptation.emf_least_q12            0.192 V                  59  Q12 V                       -0.204 %  back-EMF from which it learns
+ *   adaptation.turned_q12              1.7463 V                 537  Q12 V                       -0.136 %  back-EMFs of 16 periods that are a turn by HELD_TURNED_RAD
  *   sample_shift_q16               3.2656e-06 A/rpm              80  Q16 Q13 A/erpm              +0.386 %  q current that the sample misses
  *   fieldweak.esdq_per_erpm_q13       0.41667 Hz/rpm          14055  Q13 of Q16                  -0.002 %  corner of the back-EMF filter at low speed
  *
