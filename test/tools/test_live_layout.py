@@ -8,7 +8,7 @@ from live_support import Living, known, parts, served, until
 
 from tools.live import page as page_text
 from tools.live import view
-from tools.live.real_board import SILENT_S, RealBoard
+from tools.live.real_board import RealBoard
 
 RELEASE = (390, 500, 768, 1400, 2560)
 """On each push one of each of page.css's layouts."""
@@ -297,7 +297,7 @@ def test_a_board_that_was_switched_off_has_no_state_and_no_new_curve():
             real.run(0.05)
             return real.frame()
         until(lambda: frame()["state"] == "STOPPED", "no state")
-        assert SILENT_S == 1.0 and len(frame()["strip"]) == 1
+        assert RealBoard.SILENT_S == 1.0 and len(frame()["strip"]) == 1
         line.on = False
         until(lambda: frame()["silent"], "nobody says it", 5.0)
         until(lambda: real.scope.told["status"].startswith("no connection"), "the scope says nothing", 20.0)

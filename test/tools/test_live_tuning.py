@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import functools
+import re
 import shutil
 from pathlib import Path
 
@@ -12,15 +13,17 @@ from live_support import KEPT_DEFINES, kept_parts, parts, served, until
 from support import refusal
 
 from tools.bench.board import Library
-from tools.common import paths
+from tools.common import board_file, motor_file, paths
 from tools.common.param_rows import parameters, texts_of, with_values
 from tools.live import board
 from tools.live.pace import Pacemaker
 from tools.live.real_board import RealBoard
 from tools.live.recording import Origin
 from tools.live.symbols import Symbols
-from tools.live.tuning import BOARD, LATER, NOWHERE, Tuning
+from tools.live.tuning import BOARD, LATER, NOWHERE, Tuning, tuned
 from tools.live.virtual_board import VirtualBoard
+from tuning.constants import number_of
+from tuning.design import design
 
 HEADER = paths.ROOT / "userparams.h"
 DEFINES = [*KEPT_DEFINES.replace("-D", "").split(), board.SCOPE]
@@ -250,6 +253,30 @@ def test_values_of_the_board_that_are_not_the_header_s_are_counted(tmp_path):
         assert tuning.told()["foreign"] == differs >= 2 and wire.written > 0
 
 
+def test_the_motor_file_of_changed_values_makes_the_same_header(bench, tmp_path):
+    values = {"SPEED_BANDWIDTH_HZ": "9.5", "IDREF_SPEED4": "-0.61", "MOTOR_INERTIA_KGM2": "0.000006"}
+    for name, text in values.items():
+        bench.change(name, text)
+    name, text = bench.tuning.motor()
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    motor = motor_file.load(str(tmp_path / name))
+    made = design(motor, board_file.load(*board_file.named(motor))).params
+    saved = texts_of(bench.tuning.saved().decode())
+    assert name == "hurst_dmb0224c10002.toml" and {key: (made[key], value) for key, value in saved.items() if made[key] != value and number_of(made[key]) != number_of(value)} == {}
+    assert saved == texts_of(HEADER.read_text(encoding="utf-8")) | values
+    bench.change("NOMINAL_BUS_V", "23")
+    assert "# Not in it: NOMINAL_BUS_V 23 (a board file says it).\n" in bench.tuning.motor()[1]
+    bench.logs("not in the motor file: NOMINAL_BUS_V 23 (a board file says it)")
+
+
+def test_a_header_that_names_no_motor_file_has_none_to_save_unless_one_is_given(tmp_path):
+    header = tmp_path / "userparams.h"
+    header.write_text(re.sub(r"Made from .*", "My own.", HEADER.read_text(encoding="utf-8")), encoding="utf-8")
+    refusal(Tuning.of(header, DEFINES, symbols(), symbols()).motor, "names no motor file", "MOTOR=name")
+    files = (paths.MOTORS / "hurst_dmb0224c10002.toml", paths.BOARDS / "mclv.toml")
+    assert Tuning.of(header, DEFINES, symbols(), symbols(), files).motor() == Tuning.of(HEADER, DEFINES, symbols(), symbols()).motor()
+
+
 def test_what_was_built_is_removed_in_the_end():
     tuning = Tuning.of(HEADER, DEFINES, symbols(), symbols())
     folders = [tuning.compiler.folder, tuning.compiler.results]
@@ -272,7 +299,8 @@ def test_where_parameters_are_constants_the_page_says_what_to_build():
     assert Tuning.of(HEADER, [board.SCOPE], plain, plain) is None and Tuning.of(HEADER, DEFINES, symbols(), plain) is None
     page = object.__new__(RealBoard)
     page.tuning = None
-    refusal(page.header, "constants of this firmware", "DEFINES=-DPARAMS_IN_RAM")
+    for what in (page.header, lambda: tuned(page.tuning)):
+        refusal(what, "constants of this firmware", "DEFINES=-DPARAMS_IN_RAM")
 
 
 # ---- in the browser ---------------------------------------------------------------------------------------------------------------
@@ -317,6 +345,8 @@ def test_a_value_that_is_typed_is_in_the_board_unsaved_undone_by_one_key_and_sav
     assert item.get_attribute("value") == "9.5" and "changed" in item.get_attribute("class")
     text = page.run("return fetch(`/save/header${location.search}`).then((answer) => answer.text())")
     assert texts_of(text)["SPEED_BANDWIDTH_HZ"] == "9.5"
+    name, text = page.run("return fetch(`/save/motor${location.search}`).then(async (answer) => [answer.headers.get('Content-Disposition'), await answer.text()])")
+    assert name == 'attachment; filename="hurst_dmb0224c10002.toml"' and "\n[tune]\nSPEED_BANDWIDTH_HZ = 9.5\n" in text
     page.wait("return window.eval('foc33.frame.kept').unsaved > 0", "the board does not have it") # as the firmware itself counts
     item.send_keys(CTRL_Z)
     waits(page, "document.getElementById('tuning-text').textContent === 'nothing is changed'", "not undone")

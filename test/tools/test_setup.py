@@ -83,7 +83,7 @@ def test_a_compiler_and_ruby_are_for_root_only(machine):
     (machine.bin / "gcc").unlink()
     code, said = machine.run("tools/setup/prepare.sh test", INSTALL="no")
     assert code == 2 and said.count("\n") == 1
-    assert re.search(r"; without root: python3 -m venv .* pip install numpy matplotlib openpyxl pyelftools intelhex pyserial aiohttp pytest tqdm; "
+    assert re.search(r"; without root: python3 -m venv .* pip install numpy matplotlib openpyxl pyelftools intelhex pyserial aiohttp tomlkit pytest tqdm; "
                      r"ask whoever is root for gcc libc6-dev binutils ruby$", said.strip())
     machine.program("python3", "exit 0")
     assert machine.run(INSTALL="no")[1].endswith("without root: ask whoever is root for gcc libc6-dev binutils\n")

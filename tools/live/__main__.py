@@ -32,7 +32,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
     parser.add_argument("--kept", type=Path, metavar="FILE", help="the virtual board's pages of kept parameters: read from this file, and written in the end")
     parser.add_argument("--pace", default="1", help="motor seconds in a second: " + ", ".join(f"{pace:g}" for pace in PACES))
-    parser.add_argument("--port", help="serial port of a real board, whose firmware has SCOPE 1")
+    parser.add_argument("--port", help="serial port of a real board; with SCOPE 1 in its firmware the page can start the motor and has a scope")
     parser.add_argument("--elf", type=Path, metavar="FILE", help="ELF file of the firmware on it; default build/target/foc33.elf, as make firmware leaves it")
     parser.add_argument("--listen", metavar="PORT", help="TCP port of the page; default 8033, or a free one")
     parser.set_defaults(command=_live)
@@ -57,9 +57,12 @@ def _live(options: argparse.Namespace) -> int:
 
 def _real(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any]:
     """Makes the bench of a board at a serial port. The PC's firmware, with the same header, tells what its numbers mean."""
+    from .listened_board import ListenedBoard, has_scope
     from .real_board import RealBoard
     from .symbols import Symbols
     symbols = Symbols.read(options.elf or IMAGE)
+    if not has_scope(symbols):
+        return lambda: ListenedBoard(options.port, parts.motor.title, symbols, parts.library)
     tuning, modes = _tuning(options, parts, symbols), command_common.macros(options.defines)
     motor = motor_file.load(str(parts.motor.path)) if options.motor else None # else the header says what the motor is
     return lambda: RealBoard(options.port, parts.motor.title, symbols, parts.library.params, tuning, motor, modes)
@@ -87,7 +90,8 @@ def _tuning(options: argparse.Namespace, parts: "board.Parts", symbols: "Symbols
     from .tuning import Tuning
     folder = command_common.header_for(options)
     header = ((build.header_folder(folder) if folder else None) or paths.ROOT) / build.HEADER
-    return Tuning.of(header, with_scope(command_common.macros(options.defines)), Symbols.read(parts.symbols), symbols)
+    files = (parts.motor.path, parts.board.path) if options.motor else None
+    return Tuning.of(header, with_scope(command_common.macros(options.defines)), Symbols.read(parts.symbols), symbols, files)
 
 
 def _parts(options: argparse.Namespace) -> "board.Parts":

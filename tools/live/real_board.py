@@ -2,7 +2,6 @@
 
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,22 +10,20 @@ from tools.common import drive_tables, motor_file
 from tools.common.errors import UserError
 
 from . import lnet, view
+from .at_port import AtPort
 from .kept import Kept
 from .loop_response import LoopResponse, measured_loop
 from .pace import FRAME_S
 from .response import TARGET_MODE
 from .scope import Scope
 from .symbols import Symbols
-from .tuning import FIXED, Tuning
+from .tuning import FIXED, Tuning, tuned
 from .watch import Watch
 
 LEASE_MS, RENEW_S = 2000, 0.5
 """How long the firmware obeys without hearing from the page; and how often it hears."""
-SILENT_S = 1.0
-"""So long without an answer, and the page says so."""
 PANEL_MODE = 0
 """Of scope_command."""
-CSV_S = 600.0
 
 
 @dataclass
@@ -41,30 +38,22 @@ class Remote:
     renew_at_s: float = 0.0
 
 
-class RealBoard:
+class RealBoard(AtPort):
     """As VirtualBoard for the server; time passes by itself."""
 
     def __init__(self, port: Any, title: str, symbols: Symbols, params: Mapping[str, float], tuning: Tuning | None = None,
                  motor: motor_file.Motor | None = None, modes: Collection[str] = ()) -> None:
-        self.port, self.title, self.symbols, self.params = port, title, symbols, params
+        super().__init__(port, title)
+        self.symbols, self.params = symbols, params
         self.watch = Watch(symbols, params)
         self.kept, self.tuning = Kept.of(symbols), tuning
         self.loops = LoopResponse.of(symbols, params, motor, modes, time.monotonic)
-        self.begun_s = time.monotonic()
-        self.time_s = 0.0
         self.values: dict[str, float] | None = None
-        self.heard_s = -math.inf
         self.scope: Scope | None = None
         self.remote: Remote | None = None
         self.driver: Any = None
         """the tab that has started the motor"""
         self.clears = False
-        self.rows: deque[dict[str, float]] = deque(maxlen=round(CSV_S / FRAME_S))
-        self.strip: deque[list[Any]] = deque(maxlen=round(view.STRIP_S / FRAME_S))
-        self.log: deque[dict[str, Any]] = deque(maxlen=200)
-        self.lines = self.told = 0
-        self.state = self.fault = ""
-        self.was_silent = False
         self.first_link: lnet.Lnet | None = self._connect()
 
     def _connect(self) -> lnet.Lnet:
@@ -92,15 +81,6 @@ class RealBoard:
         for part in (self.scope, self.tuning):
             if part is not None:
                 part.end()
-
-    def paced(self, pace: float) -> None:
-        """Its time is everybody's."""
-        if pace != 1.0:
-            raise UserError("a real board has real time", "PACE", "leave it out")
-
-    def run(self, seconds: float) -> None:
-        """Nothing to do."""
-        self.time_s = time.monotonic() - self.begun_s
 
     # ---- the link's thread -------------------------------------------------------------------------------------------------
     def _beat(self, link: lnet.Lnet) -> None:
@@ -183,23 +163,17 @@ class RealBoard:
     def _range(self) -> tuple[float, float]:
         return self.params["MINIMUM_SPEED_RPM"], self.params["MAXIMUM_SPEED_RPM"]
 
-    def note(self, text: str, kind: str = "action") -> None:
-        """A line of the log."""
-        self.log.append({"id": self.lines, "t": round(self.time_s, 3), "text": text, "kind": kind, "same": ""})
-        self.lines += 1
-
     def hello(self) -> dict[str, Any]:
         """All that a new tab must know."""
         low, high = self._range()
-        return {"virtual": False, "motor": self.title, "board": str(self.port), "defines": [], "sliders": {}, "throws": [],
-                "remote": {"low": low, "high": high}, "max_current_a": self.params["MAXIMUM_CURRENT_A"], "nominal_bus_v": self.params["NOMINAL_BUS_V"],
-                "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(False), "kept": self.kept is not None, "loops": self.loops and self.loops.told, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None}
+        return self.about(self.params) | {
+            "remote": {"low": low, "high": high}, "panels": view.panels(False), "kept": self.kept is not None, "loops": self.loops and self.loops.told,
+            "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:
         """How things stand, as far as the board has told."""
         new = []
-        silent = self._silent()
+        silent = self.silent()
         values = None if silent else self.values
         if values is not None:
             self._note_changes(values)
@@ -209,32 +183,18 @@ class RealBoard:
         for part in (self.kept, self.tuning, self.loops):
             while part is not None and part.news:
                 self.note(part.news.popleft())
-        told, self.told = self.told, self.lines
-        reasons = int(values["limits"]) if values else 0
         return {"t": round(self.time_s, 3), "run": 1, "state": "" if silent else self.state, "fault": self.fault or "NONE",
-                "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
+                "limits": self.limits(int(values["limits"]) if values else 0),
                 "now": {name: round(value, 4) for name, value in values.items()} if values else None, "outputs": 63 if self.state in view.ON and not silent else 0,
-                "strip": new, "orbit": self._vectors(values), "log": [line for line in self.log if line["id"] >= told],
+                "strip": new, "orbit": self._vectors(values), "log": self.news(),
                 "kept": self.kept.told() if self.kept else None, "unmeasured": self.loops and self.loops.refusals("" if silent else self.state),
                 "remote": None if self.remote is None else {"run": self.remote.run, "target_rpm": self.remote.target_rpm},
                 "silent": silent}
 
-    def _silent(self) -> bool:
-        """No answer for a while: how things stand is not known. Each change has its line in the log."""
-        silent = time.monotonic() > max(self.heard_s, self.begun_s) + SILENT_S
-        if silent != self.was_silent:
-            self.note("no answer" if silent else "it answers again", "fault")
-        self.was_silent = silent
-        return silent
-
     def _note_changes(self, values: dict[str, float]) -> None:
         state = dict(enumerate(view.states())).get(int(values["state"]), "?")
         fault = {row.code: row.name for row in drive_tables.faults()}.get(int(values["fault"]), "?")
-        if state != self.state:
-            self.note(f"state {state}", "state")
-        if fault != self.fault and (fault != "NONE" or self.fault):
-            self.note("fault cleared" if fault == "NONE" else f"fault {fault}", "fault")
-        self.state, self.fault = state, fault
+        self.note_changes(state, fault)
 
     def _strip_row(self, values: dict[str, float]) -> list[float | None]:
         """As VirtualBoard's rows, of the curves that a real board has."""
@@ -251,24 +211,10 @@ class RealBoard:
         return {name: [[round(d * math.cos(angle) - q * math.sin(angle), 3), round(d * math.sin(angle) + q * math.cos(angle), 3)]]
                 for name, d, q in (("v", values["v_d_v"], values["v_q_v"]), ("i", values["i_d_a"], values["i_q_a"]))}
 
-    def scenario(self) -> str:
-        """Only a virtual board can repeat."""
-        raise UserError("a real board has no scenario", "page", "save its CSV")
-
     def header(self) -> bytes:
         """userparams.h with what has been changed."""
-        if self.tuning is None:
-            raise UserError("no parameter can change", "page", FIXED)
-        return self.tuning.saved()
+        return tuned(self.tuning).saved()
 
     def loop(self) -> str:
         """The loop that was measured last."""
         return measured_loop(self.loops)
-
-    def csv(self) -> str:
-        """What was read, a row a frame, of the last ten minutes."""
-        if not self.rows:
-            raise UserError("nothing is recorded yet", "CSV", "wait a moment")
-        rows = list(self.rows)
-        return "".join(",".join(f"{value:.6g}" if isinstance(value, float) else str(value) for value in row) + "\n"
-                       for row in [list(rows[0]), *(row.values() for row in rows)])

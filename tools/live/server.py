@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import secrets
 import signal
 from typing import Any
@@ -14,6 +15,7 @@ from tools.common.errors import UserError
 
 from . import page
 from .pace import PACES, Pacemaker
+from .tuning import tuned
 
 ADDRESS = "127.0.0.1"
 NAMES = (ADDRESS, "localhost")
@@ -23,6 +25,10 @@ AHEAD = 2
 MOST_ROWS, MOST_LINES = 2000, 200
 """Of curves and log in such a frame."""
 LONGEST_MESSAGE = 4096
+UNSAFE = r"[^\w.-]"
+"""In a file's name."""
+MOTOR = "motor"
+"""To be saved, too: its name is the motor's own."""
 SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv"), "header": ("userparams.h", "text/x-c"),
          "loop": ("loop.csv", "text/csv")}
 
@@ -176,13 +182,18 @@ class Server:
 
     async def _save(self, request: web.Request) -> web.Response:
         what = request.match_info["what"]
-        if what not in SAVED:
+        if what not in (*SAVED, MOTOR):
             raise web.HTTPNotFound(text="foc33: nothing to save by this name\n")
-        name, kind = SAVED[what]
         try:
-            saved = await self._ask(getattr(self.bench, what))
+            if what == MOTOR: # the tuner takes its time: the board does not wait
+                name, saved = await self.loop.run_in_executor(None, lambda: tuned(self.bench.tuning).motor())
+                kind = "application/toml"
+            else:
+                name, kind = SAVED[what]
+                saved = await self._ask(getattr(self.bench, what))
         except UserError as error:
             return web.Response(status=409, text=f"foc33: {error}\n")
+        name = re.sub(UNSAFE, "_", name)
         body = saved if isinstance(saved, bytes) else saved.encode("utf-8")
         return web.Response(body=body, content_type=kind, charset="utf-8", headers={"Content-Disposition": f'attachment; filename="{name}"'})
 

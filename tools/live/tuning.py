@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from tools.bench import build
-from tools.common import paths
+from tools.common import board_file, paths
 from tools.common.errors import UserError, suggestion
 from tools.common.param_rows import parameters, texts_of, with_values
 from tools.image.program import contents, reading
@@ -39,6 +39,8 @@ BOARD, LATER, NOWHERE = "board", "build", "unused"
 LOOK_S = 1.0
 """How often it looks whether the board still has the values."""
 NUMBER = re.compile(r"[-+]?(0[xX][0-9a-fA-F]+|(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)")
+MADE_FROM = re.compile(r"Made from (.+\.toml) and (.+\.toml) by: make tune ")
+"""The files of a header that the tuner has written."""
 REFUSED = re.compile(r"^foc33: .*?userparams\.h:\d+: (.*?)(: correct it)?$", re.MULTILINE)
 
 
@@ -88,6 +90,13 @@ class Compiler:
         return Built(found["tuned_params"], found["tuned_scales"], zlib.crc32((self.results / "rest.i").read_bytes()))
 
 
+def files_of(header: str) -> tuple[Path, Path] | None:
+    """Motor file and board file as the header's head names them; None if they are not there."""
+    found = MADE_FROM.search(header)
+    files = (paths.ROOT / found[1], paths.ROOT / found[2]) if found else None
+    return files if files and all(file.is_file() for file in files) else None
+
+
 def _bytes(text: str) -> bytes:
     """A header's text as its file has it, whatever its comments are written in."""
     return text.encode("utf-8", "surrogateescape")
@@ -114,14 +123,23 @@ def _objects(path: Path, names: tuple[str, ...]) -> dict[str, bytes]:
         return found
 
 
+def tuned(tuning: "Tuning | None") -> "Tuning":
+    """Refused where parameters are constants."""
+    if tuning is None:
+        raise UserError("no parameter can change", "page", FIXED)
+    return tuning
+
+
 class Tuning:
     """For one board. beat() belongs to the link's thread; ask() may take seconds and belongs to a thread of its own.
 
     `layout`: symbols of the PC's firmware with the same header and modes; `symbols`: those of the board's firmware."""
 
-    def __init__(self, header: Path, defines: list[str], layout: Symbols, symbols: Symbols) -> None:
+    def __init__(self, header: Path, defines: list[str], layout: Symbols, symbols: Symbols, files: tuple[Path, Path] | None = None) -> None:
         self.header = header.read_bytes().decode("utf-8", "surrogateescape")
         self.defines, self.layout, self.symbols = defines, layout, symbols
+        self.files = files or files_of(self.header)
+        """motor file and board file"""
         self.publish: Callable[[dict[str, Any]], None] = lambda message: None
         self.lock = threading.Lock()
         self.changed: dict[str, tuple[str, str]] = {}
@@ -139,9 +157,9 @@ class Tuning:
         self.looked_s = 0.0
 
     @staticmethod
-    def of(header: Path, defines: list[str], layout: Symbols, symbols: Symbols) -> "Tuning | None":
-        """None of a firmware whose parameters are constants."""
-        return Tuning(header, defines, layout, symbols) if all(f"{BASE}.minimum_erpm" in each.variables for each in (layout, symbols)) else None
+    def of(header: Path, defines: list[str], layout: Symbols, symbols: Symbols, files: tuple[Path, Path] | None = None) -> "Tuning | None":
+        """None of a firmware whose parameters are constants. `files`: motor and board; by default those that the header names"""
+        return Tuning(header, defines, layout, symbols, files) if all(f"{BASE}.minimum_erpm" in each.variables for each in (layout, symbols)) else None
 
     @cached_property
     def compiler(self) -> Compiler:
@@ -284,3 +302,17 @@ class Tuning:
     def saved(self) -> bytes:
         """The header with the changed values, else to the last byte as its file is."""
         return _bytes(with_values(self.header, {name: text for name, (text, _) in self.changed.items()}))
+
+    def motor(self) -> tuple[str, str]:
+        """Name and text of a motor file of which `make tune` makes the same header; takes seconds."""
+        if self.files is None:
+            raise UserError("the header names no motor file", "motor file", "start make live with MOTOR=name, or save userparams.h")
+        try:
+            from tuning.motor_export import motor_text
+        except ImportError:
+            raise UserError("tomlkit is missing", "motor file", "start by make live, which installs it") from None
+        motor, board = self.files
+        changed = {name: text for name, (text, _) in list(self.changed.items())}
+        text, left = motor_text(motor, board_file.load(str(board)), self.texts | changed)
+        self.news.extend(f"not in the motor file: {each}" for each in left)
+        return motor.name, text

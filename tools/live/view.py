@@ -124,6 +124,12 @@ def panels(virtual: bool) -> list[dict[str, Any]]:
     return [panel for panel in found if panel["lines"]]
 
 
+def told_panels() -> list[dict[str, Any]]:
+    """Of a board that only tells its speed."""
+    speed = next(panel for panel in panels(False) if panel["title"] == "speed")
+    return [speed | {"lines": [line for line in speed["lines"] if line["name"] == "estimate"]}]
+
+
 @cache
 def states() -> dict[str, str]:
     """Name and meaning, in the order of their numbers."""

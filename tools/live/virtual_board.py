@@ -26,7 +26,7 @@ from .record import Records
 from .recording import BUTTONS, POT, Origin, Recording
 from .scope import Scope
 from .symbols import Symbols
-from .tuning import FIXED, Tuning
+from .tuning import FIXED, Tuning, tuned
 
 SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm", "fw.profile_a", "plant.torque_mean_nm"]
 FIRST_S = 0.01
@@ -337,9 +337,7 @@ class VirtualBoard:
 
     def header(self) -> bytes:
         """userparams.h with what has been changed."""
-        if self.tuning is None:
-            raise UserError("no parameter can change", "page", FIXED)
-        return self.tuning.saved()
+        return tuned(self.tuning).saved()
 
     def loop(self) -> str:
         """The loop that was measured last."""

@@ -5,7 +5,7 @@
 #   tools/setup/prepare.sh tune    the same, and openpyxl
 #   tools/setup/prepare.sh target  the first, with pyelftools and intelhex
 #   tools/setup/prepare.sh scope   the third, with pyserial
-#   tools/setup/prepare.sh live    the same, and aiohttp
+#   tools/setup/prepare.sh live    the same, aiohttp and tomlkit
 #   tools/setup/prepare.sh test    all of that, pytest, and Ruby with gem
 #
 # Environment: CC (gcc), PYTHON (this interpreter and no other), RUBY (ruby), INSTALL=no (install nothing, say what is missing).
@@ -112,8 +112,8 @@ case $job in
 esac
 case $job in
     live | test)
-        modules="$modules aiohttp"
-        python_packages="$python_packages python3-aiohttp"
+        modules="$modules aiohttp tomlkit"
+        python_packages="$python_packages python3-aiohttp python3-tomlkit"
         ;;
 esac
 

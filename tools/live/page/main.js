@@ -26,12 +26,13 @@ const board = new BoardView((command) => link.send(command));
 
 function begin(hello) {
   document.body.classList.toggle("real", !hello.virtual);
+  document.body.classList.toggle("told", hello.remote === null); // a board that only tells
   by("what").textContent = by("what").title = [hello.motor, hello.board, ...hello.defines].join(" · ");
   ["sliders", "throws", "states", "log", "pace"].forEach((id) => by(id).replaceChildren());
   for (const pace of hello.paces) { make("option", { value: pace, textContent: pace === 1 ? "real time" : `1 : ${Math.round(1 / pace)}` }, by("pace")); }
   const send = (command) => link.send(command);
   const drive = new DriveView(hello), strips = new StripsView(hello), loops = new LoopsView(hello, send);
-  const own = hello.virtual ? [board, new BenchView(hello, send), rotor ??= new RotorView(hello)] : [new RemoteView(hello.remote, send)];
+  const own = hello.virtual ? [board, new BenchView(hello, send), rotor ??= new RotorView(hello)] : hello.remote ? [new RemoteView(hello.remote, send)] : [];
   views = { drive, strips, loops, scope: new ScopeView(hello, send), tuning: new TuningView(hello, send), planes: new PlanesView(hello), all: [drive, strips, loops, new KeptView(hello, send), ...own] };
   run = 0;
 }
@@ -73,10 +74,10 @@ addEventListener("resize", () => views?.loops.draw());
 
 by("power").addEventListener("click", () => link.send({ power: true }));
 by("pace").addEventListener("change", () => { paceBusy = performance.now() + 500; link.send({ pace: Number(by("pace").value) }); });
-for (const what of ["scenario", "csv", "header", "loop"]) {
+for (const what of ["scenario", "csv", "header", "motor", "loop"]) {
   by(`save-${what}`).addEventListener("click", async () => { // what cannot be saved says why, instead of an empty file
     const answer = await fetch(`/save/${what}${location.search}`);
     if (!answer.ok) { warn((await answer.text()).trim()); return; }
-    save(await answer.blob(), { scenario: "recorded.toml", csv: "recorded.csv", header: "userparams.h", loop: "loop.csv" }[what]);
+    save(await answer.blob(), /filename="(.*)"/.exec(answer.headers.get("Content-Disposition"))[1]);
   });
 }
