@@ -192,10 +192,16 @@ static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
     held_go_on(d, p, held_speed(run, emf), load_q16);
 }
 
+/** Steps since the back-EMF was taken that a step's is compared with. */
+static uint16_t held_compared_steps(const held_t *shaft)
+{
+    return (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps);
+}
+
 /** Half of what the back-EMF's d part would have changed by, of a rotor as fast as the back-EMF says. */
 static uint16_t held_half_turned(const drive_run_t *run, const drive_params_t *p)
 {
-    return (uint16_t)(3 * qm_abs(qm_mulhi(run->held.emf_q12.q, held_as_asked(run, p, run->held.steps)))); /* pi, nearly */
+    return (uint16_t)(3 * qm_abs(qm_mulhi(run->held.emf_q12.q, held_as_asked(run, p, held_compared_steps(&run->held))))); /* pi, nearly */
 }
 
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
@@ -206,11 +212,11 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1; /* dead time shakes it by as much */
     const uint16_t half = held_half_turned(&d->run, p), tells = (uint16_t)(half > least);
     const int16_t turned = held_less(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
-    const uint16_t turns = (uint16_t)(shaft->steps > 1u && turned > (int16_t)(tells ? half : least));
+    const uint16_t steps = held_compared_steps(shaft), turns = (uint16_t)(steps > 1u && turned > (int16_t)(tells ? half : least));
 
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
         held_will(shaft, ((turns && tells) || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
-    } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && shaft->steps >= HELD_ASK_STEPS)) {
+    } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && steps >= HELD_ASK_STEPS)) {
         held_will(shaft, HELD_LEARN);
     } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */
         shaft->emf_q12 = emf;

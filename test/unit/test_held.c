@@ -480,6 +480,23 @@ void test_a_rotor_that_turns_slowly_in_a_long_question_turns_again_after_ten_deg
     }
 }
 
+void test_a_rotor_that_speeds_up_in_a_long_question_is_not_taken_for_one_that_stands_when_the_question_begins_anew(void)
+{
+    EACH_DIRECTION(direction) {
+        float angle = 0.0F;
+        asked(direction, 75);
+        steps(1);
+        for (int16_t n = 1; shaft->phase == (uint16_t)HELD_ASKED && n < 40; n++) {
+            const int16_t q_q12 = (int16_t)(75 + 10 * n); /* fast enough to tell after eight steps, and one more would say that it stands */
+            angle += (n > (int16_t)(2u * HELD_ASK_STEPS)) ? (float)q_q12 * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm() : 0.0F;
+            rig_emf(qm_mulhi((int16_t)(-2 * q_q12), trig_sincos((angle_t)angle).sin), (int16_t)(direction * q_q12));
+            steps(1);
+        }
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+    }
+}
+
 void test_a_back_emf_that_does_not_settle_turns_the_frame_by_its_sum_and_nothing_of_a_question_before_counts(void)
 {
     EACH_DIRECTION(direction) {
