@@ -11,7 +11,7 @@
 #define HELD_PERIOD_SHIFT (DEFER_DUTIES ? 11 : 12)   /* from a period's turn, Q32, to a step's, angle counts */
 
 /** The one place that writes the phase. */
-static void held_enter(held_t *shaft, held_phase_t next)
+static NOINLINE void held_enter(held_t *shaft, held_phase_t next)
 {
     shaft->phase = (uint16_t)next;
     shaft->steps = 0;
@@ -56,7 +56,7 @@ QM_INLINE QM_WRAPS uint16_t held_apart(int16_t a, int16_t b)
 }
 
 /** How far the back-EMF has moved: its parts fit half the format. */
-static uint16_t held_moved(dq_t emf, dq_t from)
+static NOINLINE uint16_t held_moved(dq_t emf, dq_t from)
 {
     return (uint16_t)(held_apart(emf.d, from.d) + held_apart(emf.q, from.q));
 }
@@ -192,16 +192,10 @@ static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
     held_go_on(d, p, held_speed(run, emf), load_q16);
 }
 
-/** Steps since the back-EMF was taken that a step's is compared with. */
-static uint16_t held_compared_steps(const held_t *shaft)
-{
-    return (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps);
-}
-
 /** Half of what the back-EMF's d part would have changed by, of a rotor as fast as the back-EMF says. */
-static uint16_t held_half_turned(const drive_run_t *run, const drive_params_t *p)
+static uint16_t held_half_turned(const drive_run_t *run, const drive_params_t *p, uint16_t steps)
 {
-    return (uint16_t)(3 * qm_abs(qm_mulhi(run->held.emf_q12.q, held_as_asked(run, p, held_compared_steps(&run->held))))); /* pi, nearly */
+    return (uint16_t)(3 * qm_abs(qm_mulhi(run->held.emf_q12.q, held_as_asked(run, p, steps)))); /* pi, nearly */
 }
 
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
@@ -209,10 +203,11 @@ static uint16_t held_half_turned(const drive_run_t *run, const drive_params_t *p
 static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
 {
     held_t *shaft = &d->run.held;
-    const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1; /* dead time shakes it by as much */
-    const uint16_t half = held_half_turned(&d->run, p), tells = (uint16_t)(half > least);
+    const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1;                                              /* dead time shakes it by as much */
+    const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps); /* since what it is compared with */
+    const uint16_t half = held_half_turned(&d->run, p, steps), tells = (uint16_t)(half > least);
     const int16_t turned = held_less(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
-    const uint16_t steps = held_compared_steps(shaft), turns = (uint16_t)(steps > 1u && turned > (int16_t)(tells ? half : least));
+    const uint16_t turns = (uint16_t)(steps > 1u && turned > (int16_t)(tells ? half : least));
 
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
         held_will(shaft, ((turns && tells) || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
@@ -320,16 +315,18 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     case HELD_ASKED: held_compare(d, p, emf, moved); break;
     case HELD_STANDS:
     default:
-        if (shaft->act == (uint16_t)HELD_WAITS && moved > most) { /* the frame is turned back first */
-            held_will(shaft, HELD_GOES_ON);
-        } else { /* the load is what flows, and it grows */
-            shaft->turned_q12 = 0;
-            if (shaft->act == (uint16_t)HELD_WAITS && shaft->steps <= HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) {
+        if (shaft->act == (uint16_t)HELD_WAITS) { /* else the frame is turned back first */
+            if (moved > most && shaft->steps > HELD_ASK_STEPS) {
+                held_will(shaft, HELD_GOES_ON);
+                break;
+            }
+            if (shaft->steps <= HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) {
                 shaft->run_on = along_direction(d, -HELD_PULL_ANGLE);
                 held_will(shaft, HELD_TURN_BACK);
             }
-            observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
         }
+        shaft->turned_q12 = 0; /* the load is what flows, and it grows */
+        observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
         break;
     }
 }
@@ -371,6 +368,8 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
     case HELD_LEARN:
         if (held_moved(emf, shaft->emf_q12) <= (uint16_t)p->adaptation.emf_least_q12 >> 1) { /* it was not let go while this waited */
             held_learn(d, p, emf);
+        } else { /* nor did it stand */
+            held_enter(shaft, HELD_SETTLES);
         }
         break;
     case HELD_TURN_BACK: held_turn_back(d, p, shaft->run_on); break;

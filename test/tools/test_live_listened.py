@@ -1,5 +1,8 @@
 """A board whose firmware has no scope on the page of make live: what its status line and its fault recorder's rows say, and nothing that cannot be asked of it."""
 
+import csv
+import io
+import re
 import subprocess
 import sys
 import time
@@ -11,7 +14,7 @@ from support import refusal
 
 from tools.common import paths
 from tools.live import listened_board, lnet
-from tools.live.listened_board import TELLS, ListenedBoard, has_scope
+from tools.live.listened_board import DAMAGED, TELLS, ListenedBoard, has_scope
 from tools.live.recording import POT, Origin
 from tools.live.symbols import Symbols
 from tools.live.virtual_board import VirtualBoard
@@ -94,6 +97,27 @@ def test_the_fault_recorder_s_rows_are_the_same_trace_as_of_a_virtual_board_and_
     assert not any(text.startswith(("row", "record", "state 7")) for text in logs(desk))
 
 
+def test_a_record_that_lost_a_line_is_told_and_costs_no_other_one(desk):
+    desk.s2()
+    desk.passes(2.5)
+    desk.board.act({"fault": ["open_b", True]})
+    desk.passes(2.5)
+    text, page, traces = "".join(desk.said), ListenedBoard(Quiet(), "the motor", SYMBOLS, MADE.library), []
+    page.publish = lambda message: traces.append(message["trace"])
+    record = text[text.index("record fault"):]
+    page.take(re.sub(r"row 30 .*\r\n", "", record))
+    page.take("state 7 fault OPEN_PHASE speed 0 rpm\r\n" * 20)
+    assert traces == [] and DAMAGED not in [line["text"] for line in page.frame()["log"]]
+    page.take(record)
+    assert len(traces) == 1 and traces[0]["fault"] == "OPEN_PHASE" and DAMAGED in [line["text"] for line in page.frame()["log"]]
+    page.take(record.partition("row 30 ")[0])
+    for _ in range(400): # and no second one comes
+        page.take("state 7 fault OPEN_PHASE speed 0 rpm\r\n")
+    assert [line["text"] for line in page.frame()["log"]] == [DAMAGED] and len(page.records.text) <= 200
+    page.take(record + record) # two at once
+    assert len(traces) == 2
+
+
 @pytest.mark.parametrize("size", [1, 7, 100])
 def test_however_the_text_is_cut_the_same_is_shown(desk, size):
     desk.passes(1.2)
@@ -118,6 +142,9 @@ def test_a_first_line_without_its_beginning_and_what_is_no_text_are_left_out_and
     desk.page.take("\r\nstate 5 fault NONE speed -1500 rpm motor 61 C limit CURRENT RAMP NOT_ONE selftest 3\r\n")
     frame = desk.page.frame()
     assert (frame["state"], frame["limits"], frame["strip"][0][1]) == (MADE.library.states[5], ["CURRENT", "RAMP"], -1500)
+    desk.page.take("state 5 fault NONE speed 7 rpm app x,y\r\n")
+    desk.page.frame()
+    assert list(csv.DictReader(io.StringIO(desk.page.csv())))[-1]["said"] == "app x,y"
     assert desk.page.csv().splitlines()[0] == "time_s,state,fault,speed_rpm,said" and ",-1500,motor 61 C limit CURRENT RAMP NOT_ONE selftest 3" in desk.page.csv()
 
 
@@ -131,7 +158,8 @@ def test_a_board_that_says_nothing_has_no_state_and_has_one_again_when_it_speaks
     assert (frame["silent"], frame["state"], logs(desk)[-1]) == (False, "STOPPED", "it answers again")
 
 
-def test_a_port_that_goes_away_is_opened_again_when_it_is_back(monkeypatch):
+@pytest.mark.parametrize("error", lnet.PORT_ERRORS)
+def test_a_port_that_goes_away_is_opened_again_when_it_is_back(monkeypatch, error):
     class Cable:
         """Unplugged after the first words."""
 
@@ -140,7 +168,7 @@ def test_a_port_that_goes_away_is_opened_again_when_it_is_back(monkeypatch):
 
         def read(self, size: int) -> bytes:
             if not self.words:
-                raise OSError("unplugged")
+                raise error("unplugged")
             return self.words.pop(0)
 
     opened: list[Cable] = []
@@ -160,7 +188,7 @@ def test_a_port_that_goes_away_is_opened_again_when_it_is_back(monkeypatch):
 
 
 def test_nothing_can_be_asked_of_it_and_one_line_says_what_to_build(desk):
-    for work in (lambda: desk.page.act({"start": 1000}), lambda: desk.page.act({"stop": True}), desk.page.header, desk.page.loop):
+    for work in (lambda: desk.page.act({"start": 1000}), lambda: desk.page.act({"stop": True}), desk.page.header, desk.page.motor, desk.page.loop):
         refusal(work, TELLS)
     refusal(desk.page.scenario, "a real board has no scenario")
     refusal(desk.page.csv, "nothing is recorded yet")

@@ -20,7 +20,7 @@ from tools.live.pace import Pacemaker
 from tools.live.real_board import RealBoard
 from tools.live.recording import Origin
 from tools.live.symbols import Symbols
-from tools.live.tuning import BOARD, LATER, NOWHERE, Tuning, tuned
+from tools.live.tuning import BOARD, LATER, NOWHERE, Tuning, others_of, tuned
 from tools.live.virtual_board import VirtualBoard
 from tuning.constants import number_of
 from tuning.design import design
@@ -207,6 +207,8 @@ def test_beside_a_value_that_needs_a_build_others_are_still_written(bench):
     bench.change("UNDER_VOLTAGE_V", "14")
     alone = bench.memory()
     bench.tuning.ask("undo")
+    own = others_of("#define TORQUE_MODE /* x */\n# define MY_GAIN 3\n/* #define TUNING */\n#define SCOPE 1\n#define USERPARAMS_H\n")
+    assert own == {"TORQUE_MODE": "", "MY_GAIN": "3"}
     bench.change("NOMINAL_BUS_V", "23")
     bench.change("UNDER_VOLTAGE_V", "14")
     assert [row["place"] for row in bench.tuning.told()["changed"].values()] == [LATER, BOARD]
@@ -264,6 +266,8 @@ def test_the_motor_file_of_changed_values_makes_the_same_header(bench, tmp_path)
     saved = texts_of(bench.tuning.saved().decode())
     assert name == "hurst_dmb0224c10002.toml" and {key: (made[key], value) for key, value in saved.items() if made[key] != value and number_of(made[key]) != number_of(value)} == {}
     assert saved == texts_of(HEADER.read_text(encoding="utf-8")) | values
+    own = others_of("#define TORQUE_MODE /* x */\n# define MY_GAIN 3\n/* #define TUNING */\n#define SCOPE 1\n#define USERPARAMS_H\n")
+    assert own == {"TORQUE_MODE": "", "MY_GAIN": "3"}
     bench.change("NOMINAL_BUS_V", "23")
     assert "# Not in it: NOMINAL_BUS_V 23 (a board file says it).\n" in bench.tuning.motor()[1]
     bench.logs("not in the motor file: NOMINAL_BUS_V 23 (a board file says it)")
@@ -273,6 +277,9 @@ def test_a_header_that_names_no_motor_file_has_none_to_save_unless_one_is_given(
     header = tmp_path / "userparams.h"
     header.write_text(re.sub(r"Made from .*", "My own.", HEADER.read_text(encoding="utf-8")), encoding="utf-8")
     refusal(Tuning.of(header, DEFINES, symbols(), symbols()).motor, "names no motor file", "MOTOR=name")
+    gone = tmp_path / "gone.h"
+    gone.write_text(HEADER.read_text(encoding="utf-8").replace("tuning/motors/hurst_dmb0224c10002.toml", "tuning/motors/gone.toml"), encoding="utf-8")
+    refusal(Tuning.of(gone, DEFINES, symbols(), symbols()).motor, "the header's file is not there, tuning/motors/gone.toml", "MOTOR=name")
     files = (paths.MOTORS / "hurst_dmb0224c10002.toml", paths.BOARDS / "mclv.toml")
     assert Tuning.of(header, DEFINES, symbols(), symbols(), files).motor() == Tuning.of(HEADER, DEFINES, symbols(), symbols()).motor()
 

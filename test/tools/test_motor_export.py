@@ -51,7 +51,7 @@ def test_where_nothing_was_changed_it_is_the_motor_s_own_file(name):
     (HURST, {"SPEED_BANDWIDTH_HZ": "9.5", "IDREF_SPEED4": "-0.61", "UNDER_VOLTAGE_V": "14"}),
     (HURST, {"MOTOR_RS_OHM": "2.8", "MOTOR_LS_MH": "1.9", "MOTOR_INERTIA_KGM2": "0.00004", "SPEED_BANDWIDTH_HZ": "5", "MAXIMUM_SPEED_RPM": "3000"}),
     (HURST, {"MOTOR_KPHI_V_PER_KRPM": "7.4", "NOPOLESPAIRS": "4", "MAXIMUM_CURRENT_A": "2.7", "MAXIMUM_SPEED_RPM": "4000", "RETRY_COUNT": "3"}),
-    (HURST, {"I2T_CURRENT_A": "1.5", "I2T_TIME_SEC": "20"}),
+    (HURST, {"I2T_CURRENT_A": "1.5", "I2T_TIME_SEC": "20"}), (HURST, {"I2T_CURRENT_A": "1.5"}),
     (IPM, {"MOTOR_LS_MH": "2.25", "LOCK_TIME": "20000"}), (IPM, {"MOTOR_SALIENCY_UH": "900"}), ("linix_45zwn24_40", {"CURRENT_BANDWIDTH_HZ": "700"})])
 def test_make_tune_gives_the_header_back_with_each_value_that_was_changed_and_no_other_one(name, changes):
     _, _, params = of(name)
@@ -78,15 +78,20 @@ def test_a_value_outside_the_file_s_own_spread_ends_the_spread():
     assert "rs_ohm" in motor_file.load(HURST).spread and "[spread]\nresistance" in path.read_text(encoding="utf-8")
     _, _, motor, _ = exported(HURST, MOTOR_RS_OHM="1.9")
     assert "rs_ohm" not in motor.spread and "ls_h" in motor.spread
+    _, _, motor, _ = exported(HURST, MOTOR_RS_OHM="2.6")
+    assert "rs_ohm" in motor.spread
 
 
-def test_a_time_constant_of_zero_takes_its_row_away():
+@pytest.mark.parametrize("time_s", ["30", "60"])
+def test_without_i2t_there_is_no_time_constant_whatever_the_header_says_of_it(time_s):
     _, board, params = of(HURST)
     with motor_path(('maximum_current = { value = 2.75', 'thermal_time = { value = 30, unit = "s", source = "test" }\nmaximum_current = { value = 2.75')) as path:
-        assert design(motor_file.load(str(path)), board).params["I2T_TIME_SEC"] == "30"
-        text, _ = motor_text(path, board, params)
-    assert "thermal_time" not in text
-    assert 'current = { value = 1.53, unit = "A peak", source = "test" }' in text
+        own = params_of(motor_file.load(str(path)), board)
+        assert (own["I2T_CURRENT_A"], own["I2T_TIME_SEC"]) == ("1.53", "30")
+        text, left = motor_text(path, board, own | {"I2T_CURRENT_A": "0", "I2T_TIME_SEC": time_s})
+        made = params_of(motor_file.read(Document(path, text)), board)
+    assert "thermal_time" not in text and made["I2T_CURRENT_A"] == "0" and 'current = { value = 1.53, unit = "A peak", source = "test" }' in text
+    assert left == []
 
 
 def test_a_load_keeps_what_it_has_beside_the_rotor(tmp_path):
@@ -109,6 +114,63 @@ def test_a_board_that_is_named_by_a_path_is_found_from_any_folder(tmp_path):
     assert motor_file.read(Document(path, text)).board == str(tmp_path / "own.toml")
 
 
+def test_the_board_that_it_was_tuned_for_is_in_the_file():
+    path, _, _ = of(HURST)
+    board = board_file.load("mclv_40khz")
+    params = params_of(motor_file.load(HURST), board)
+    text, left = motor_text(path, board, params | {"SPEED_BANDWIDTH_HZ": "9.5"})
+    motor = motor_file.read(Document(path, text))
+    assert motor.board == "mclv_40khz" and left == []
+    assert params_of(motor, board_file.load(*board_file.named(motor))) == params | {"SPEED_BANDWIDTH_HZ": "9.5"}
+
+
+def test_what_an_export_before_has_told_is_not_told_again():
+    path, board, params = of(HURST)
+    first, left = motor_text(path, board, params | {"NOMINAL_BUS_V": "23"})
+    assert len(left) == 1
+    with motor_path() as place:
+        place.write_text(first, encoding="utf-8")
+        second, left = motor_text(place, board, params)
+    assert left == [] and second.count("tuned by hand") == 1 and "NOMINAL_BUS_V" not in second
+
+
+def test_a_small_change_of_what_the_motor_is_counts():
+    _, left, motor, made = exported(HURST, MOTOR_RS_OHM="2.672", MOTOR_KPHI_V_PER_KRPM="7.236", MAXIMUM_CURRENT_A="2.752", NOMINAL_BUS_V="24.02")
+    assert motor.rs_ohm == approx(2.672) and made["MOTOR_KPHI_V_PER_KRPM"] == "7.236"
+    assert left == ["NOMINAL_BUS_V 24.02 (a board file says it)", "MAXIMUM_CURRENT_A 2.752 (it follows from [rating] maximum_current, as far as make tune allows)"]
+
+
+def test_poles_that_are_in_the_unit_of_kphi_leave_kphi_as_it_is():
+    _, board, _ = of(HURST)
+    with motor_path(('value = 7.24, unit = "V peak line-to-line/krpm"', 'value = 0.00798, unit = "V s/rad"')) as path:
+        params = params_of(motor_file.load(str(path)), board)
+        text, left = motor_text(path, board, params | {"NOPOLESPAIRS": "4", "MAXIMUM_SPEED_RPM": "4000"})
+        motor = motor_file.read(Document(path, text))
+    assert (motor.pole_pairs, left) == (4, []) and motor.kphi_v_per_krpm == approx(float(params["MOTOR_KPHI_V_PER_KRPM"]), rel=1e-5)
+
+
+@pytest.mark.parametrize("old, new, change", [
+    ('title = "a motor"', 'title = "a motor"\ntune.RETRY_COUNT = 1', {"SPEED_BANDWIDTH_HZ": "9.5"}),
+    ("resistance = { value = 2.67", 'resistance.source = "test"\nresistance.unit = "ohm phase"\nresistance.value = 2.67 #', {"MOTOR_RS_OHM": "2.5"}),
+    ('\n[mechanical]', '\n[electrical.resistance_tempco]\nvalue = 0.39\nunit = "%/K"\nsource = "copper"\n\n[mechanical]', {"MOTOR_RS_OHM": "2.5"})])
+def test_other_ways_to_write_a_motor_file_are_changed_too(old, new, change):
+    _, board, _ = of(HURST)
+    with motor_path((old, new)) as path:
+        params = params_of(motor_file.load(str(path)), board)
+        text, left = motor_text(path, board, params | change)
+        made = params_of(motor_file.read(Document(path, text)), board)
+    assert left == [] and {name: made[name] for name in change} == change
+
+
+def test_what_the_header_alone_has_and_what_is_no_number_is_told():
+    _, left, _, _ = exported(IPM, IDREF_SPEED4="MY_CURRENT", NOPOLESPAIRS="+0x4")
+    assert left == ["NOPOLESPAIRS +0x4 (no number)", "IDREF_SPEED4 MY_CURRENT (no number)"]
+    path, board, params = of(IPM)
+    constants = {"D_CURRCNTR_PTERM": "0.14288", "TORQUE_MODE": "", "MY_GAIN": "3"}
+    _, left = motor_text(path, board, params | {"CURRENT_BANDWIDTH_HZ": "700"}, constants)
+    assert left == ["D_CURRCNTR_PTERM 0.14288 (the tuner makes it of other values)", "TORQUE_MODE (a mode)", "MY_GAIN 3 (the header alone has it)"]
+
+
 def test_what_only_a_board_file_says_and_what_the_tuner_does_not_allow_is_told_with_its_value():
     text, left, _, _ = exported(IPM, NOMINAL_BUS_V="25.5", MOTOR_LS_MH="1.9")
     assert left == ["NOMINAL_BUS_V 25.5 (a board file says it)", "MAXIMUM_SPEED_RPM 4000 (it follows from [rating] maximum_speed, as far as make tune allows)"]
@@ -117,7 +179,6 @@ def test_what_only_a_board_file_says_and_what_the_tuner_does_not_allow_is_told_w
 
 @pytest.mark.parametrize("name, changes, parts", [
     (HURST, {"MOTOR_RS_OHM": "3.4"}, ("too low for 2800 rpm at half the rated torque", "raise the supply voltage")),
-    (HURST, {"IDREF_SPEED4": "MY_CURRENT"}, ("IDREF_SPEED4 is MY_CURRENT", "write a number")),
     (IPM, {"MOTOR_LS_MH": "0.8"}, ("'inductance_d' = -0.", "is impossible"))])
 def test_a_motor_that_cannot_be_is_refused_in_one_line(name, changes, parts):
     refusal(lambda: exported(name, **changes), *parts)

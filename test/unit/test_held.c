@@ -419,7 +419,7 @@ void test_the_observer_rests_while_the_angle_stands(void)
 static void lets_go(int16_t direction)
 {
     (void)answered();
-    steps(2);
+    steps(HELD_ASK_STEPS);
     rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
     steps(1);
     TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
@@ -495,6 +495,18 @@ void test_a_rotor_that_speeds_up_in_a_long_question_is_not_taken_for_one_that_st
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
     }
+}
+
+void test_one_step_s_turn_right_after_a_question_began_anew_may_be_dead_time_s(void)
+{
+    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8);
+    asked(1, 20);
+    steps(1u + 2u * HELD_ASK_STEPS);
+    rig_emf((int16_t)-more, 20);
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
 }
 
 void test_a_back_emf_that_does_not_settle_turns_the_frame_by_its_sum_and_nothing_of_a_question_before_counts(void)
@@ -622,8 +634,9 @@ void test_a_rotor_that_is_let_go_while_the_answer_waits_teaches_no_resistance(vo
     shaft->act = (uint16_t)HELD_LEARN;
     rig_emf(0, (int16_t)(40 + params.adaptation.emf_least_q12 / 2 + 1));
     held_act(&drive, &params);
-    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase); /* and the question begins anew */
     TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+    shaft->phase = (uint16_t)HELD_ASKED;
     shaft->act = (uint16_t)HELD_LEARN;
     rig_emf(0, (int16_t)(40 + params.adaptation.emf_least_q12 / 2));
     held_act(&drive, &params);
@@ -633,6 +646,7 @@ void test_a_rotor_that_is_let_go_while_the_answer_waits_teaches_no_resistance(vo
 void test_a_rotor_whose_resistance_is_known_is_held_again_only_without_back_emf_until_it_is_fast(void)
 {
     stands(1, 200);
+    steps(HELD_ASK_STEPS);
     rig_emf(0, (int16_t)(params.adaptation.emf_least_q12 + 20));
     steps(1);
     TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
@@ -643,6 +657,7 @@ void test_a_rotor_whose_resistance_is_known_is_held_again_only_without_back_emf_
     steps(2);
     TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
     stands(1, 200);
+    steps(HELD_ASK_STEPS);
     rig_emf(0, (int16_t)(params.adaptation.emf_least_q12 + 20));
     steps(1);
     rig_speed(FAST_ERPM / 2 + 10);
@@ -667,10 +682,37 @@ void test_a_reversal_in_which_the_rotor_stands_begins_a_ramp_that_sees_the_rotor
     }
 }
 
+void test_a_back_emf_that_moves_as_the_frame_has_been_turned_back_is_no_rotor_that_turns(void)
+{
+    stands(1, 200);
+    for (uint16_t n = 0; n < HELD_ASK_STEPS; n++) {
+        rig_emf(0, (int16_t)((n == 0u) ? 2 * params.adaptation.emf_least_q12 : 0));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+    }
+}
+
+void test_a_back_emf_that_fell_in_a_question_is_asked_for_again_and_then_stands(void)
+{
+    const int16_t fallen_q12 = (int16_t)(400 - params.adaptation.emf_least_q12); /* too far to have stood, too little to have turned */
+    EACH_DIRECTION(direction) {
+        asked(direction, 400);
+        steps(2);
+        TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+        rig_emf(0, (int16_t)(direction * fallen_q12));
+        for (uint16_t n = 0; shaft->phase != (uint16_t)HELD_STANDS && n < 40u; n++) {
+            steps(1);
+        }
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+        TEST_ASSERT_NOT_EQUAL(0, drive.run.adaptation.rs_q31);
+    }
+}
+
 void test_the_speed_of_a_rotor_that_is_let_go_is_limited_by_the_flux_of_when_the_angle_stopped(void)
 {
     EACH_DIRECTION(direction) {
         stands(direction, 200);
+        steps(HELD_ASK_STEPS);
         shaft->inv_kfi = 32767; /* in field weakening; the model has left it since */
         shaft->emf_sum_max_q12 = 2000;
         drive.run.model.emf_sum_max_q12 = 32767;

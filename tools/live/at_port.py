@@ -1,5 +1,7 @@
 """What a page has of any board at a serial port: its own clock, a log, the curves' rows, and whether the board is heard."""
 
+import csv
+import io
 import math
 import time
 from collections import deque
@@ -88,6 +90,8 @@ class AtPort:
         """What was heard, a row each, of the last ten minutes."""
         if not self.rows:
             raise UserError("nothing is recorded yet", "CSV", "wait a moment")
-        rows = list(self.rows)
-        return "".join(",".join(f"{value:.6g}" if isinstance(value, float) else str(value) for value in row) + "\n"
-                       for row in [list(rows[0]), *(row.values() for row in rows)])
+        rows, text = list(self.rows), io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(rows[0])
+        writer.writerows([f"{value:.6g}" if isinstance(value, float) else value for value in row.values()] for row in rows)
+        return text.getvalue()

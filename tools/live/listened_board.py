@@ -26,6 +26,7 @@ AGAIN_S = 0.5
 """After the port has gone."""
 SCOPE = "scope_command.mode"
 """A variable of a firmware with the scope."""
+DAMAGED = "a fault's record did not come whole: after a reset by its pin the board sends it again"
 TELLS = "this board's firmware only tells: build it with SCOPE 1 for start, target, scope and loops"
 
 
@@ -73,10 +74,13 @@ class ListenedBoard(AtPort):
         while not self.over.is_set():
             try:
                 self.stream = self.stream or lnet.open_port(self.port)
-                self.take(self.stream.read(4096).decode("latin-1"))
-            except (OSError, UserError): # the cable is out: no answer
+                text = self.stream.read(4096).decode("latin-1")
+            except (*lnet.PORT_ERRORS, UserError): # the cable is out: no answer
                 self.stream, self.text, self.begins = None, "", True
+                self.records.forget()
                 self.over.wait(AGAIN_S)
+                continue
+            self.take(text)
 
     def take(self, text: str) -> None:
         """More of what the board says."""
@@ -92,6 +96,9 @@ class ListenedBoard(AtPort):
         self.heard.extend(line.rstrip("\r") for line in lines)
         if trace := self.records.feed(text):
             self.publish({"trace": trace})
+        if self.records.damaged:
+            self.records.damaged = False
+            self.heard.append(DAMAGED)
 
     # ---- the page ----------------------------------------------------------------------------------------------------------
     def act(self, command: Any, who: Any = None) -> None:
@@ -136,6 +143,10 @@ class ListenedBoard(AtPort):
 
     def header(self) -> bytes:
         """It has no parameters to change."""
+        raise UserError("no parameter can change", "page", TELLS)
+
+    def motor(self) -> tuple[str, str]:
+        """Nor a motor file with them."""
         raise UserError("no parameter can change", "page", TELLS)
 
     def loop(self) -> str:

@@ -32,6 +32,13 @@ ANSWER_S = 1.0
 TRIES = 3
 
 
+try:
+    import termios
+    PORT_ERRORS: tuple[type[Exception], ...] = (OSError, termios.error)
+except ImportError: # not every system has them
+    PORT_ERRORS = (OSError,)
+
+
 class LnetError(Exception):
     """The firmware refuses, or does not answer."""
 
@@ -156,8 +163,9 @@ def open_port(port: str) -> Stream:
         raise UserError("no module serial", port, "install python3-serial") from None
     try:
         return serial.Serial(port, BAUD, timeout=0.01, exclusive=True)
-    except OSError as error: # serial's, too; without a number it could not set the speed
-        reason, remedy = OPEN_ERRORS.get(error.errno, (os.strerror(error.errno or 0), "name the one that the board is at"))
+    except PORT_ERRORS as error: # serial's, too; without a number it could not set the speed
+        number = getattr(error, "errno", None)
+        reason, remedy = OPEN_ERRORS.get(number, (os.strerror(number or 0), "name the one that the board is at"))
         raise UserError(f"cannot open the port ({reason})", port, remedy) from None
 
 

@@ -12,7 +12,8 @@ from tools.common import drive_tables
 from .symbols import Symbols
 
 HEAD = re.compile(r"record fault .*\n")
-LONGEST_LINE = 200
+LONGEST_LINE, LONGEST_RECORD = 200, 8192
+"""Characters; a record has half as many."""
 TAKEN = {"SnapDone": "SNAPSHOT", "board_bringup": "BRINGUP", "IdentifyParm": "IDENTIFY", "board_params": "PARAMS_IN_RAM or TUNING"}
 """Variables of the modes that take the recorder's place in RAM."""
 COLUMNS = {"i_a": "A", "i_b": "A", "v_d": "V", "v_q": "V", "angle": "°", "speed": "rpm", "bus": "V", "state": ""}
@@ -45,6 +46,12 @@ class Records:
         self.params, self.states = params, states
         self.text = ""
         self.trace: dict[str, Any] | None = None
+        self.damaged = False
+        """one did not come whole; whoever tells it clears it"""
+
+    def forget(self) -> None:
+        """The line was cut."""
+        self.text = ""
 
     def hello(self, symbols: Symbols) -> dict[str, Any]:
         """For a new tab."""
@@ -53,13 +60,16 @@ class Records:
     def feed(self, text: str) -> dict[str, Any] | None:
         """More of the line; a trace where a record is complete with it."""
         self.text += text
-        if not HEAD.search(self.text):
+        heads = [head.start() for head in HEAD.finditer(self.text)]
+        if not heads:
             self.text = self.text[-LONGEST_LINE:]
             return None
-        if recorder.under_way(self.text):
-            return None
-        found, self.text = recorder.of_text(self.text), ""
+        self.text, *records = [self.text[begin:end] for begin, end in zip(heads, [*heads[1:], len(self.text)])][::-1]
+        if not recorder.under_way(self.text) or len(self.text) > LONGEST_RECORD:
+            records, self.text = [self.text, *records], ""
+        found = [record for text in records for record in recorder.of_text(text)]
+        self.damaged |= len(found) < len(records)
         if not found:
             return None
-        self.trace = trace_of(found[-1], self.params, self.states)
+        self.trace = trace_of(found[0], self.params, self.states)
         return self.trace

@@ -15,7 +15,6 @@ from tools.common.errors import UserError
 
 from . import page
 from .pace import PACES, Pacemaker
-from .tuning import tuned
 
 ADDRESS = "127.0.0.1"
 NAMES = (ADDRESS, "localhost")
@@ -25,7 +24,7 @@ AHEAD = 2
 MOST_ROWS, MOST_LINES = 2000, 200
 """Of curves and log in such a frame."""
 LONGEST_MESSAGE = 4096
-UNSAFE = r"[^\w.-]"
+UNSAFE = r"[^A-Za-z0-9_.-]"
 """In a file's name."""
 MOTOR = "motor"
 """To be saved, too: its name is the motor's own."""
@@ -186,7 +185,7 @@ class Server:
             raise web.HTTPNotFound(text="foc33: nothing to save by this name\n")
         try:
             if what == MOTOR: # the tuner takes its time: the board does not wait
-                name, saved = await self.loop.run_in_executor(None, lambda: tuned(self.bench.tuning).motor())
+                name, saved = await self.loop.run_in_executor(None, self.bench.motor)
                 kind = "application/toml"
             else:
                 name, kind = SAVED[what]

@@ -91,10 +91,15 @@ class Compiler:
 
 
 def files_of(header: str) -> tuple[Path, Path] | None:
-    """Motor file and board file as the header's head names them; None if they are not there."""
+    """Motor file and board file as the header's head names them."""
     found = MADE_FROM.search(header)
-    files = (paths.ROOT / found[1], paths.ROOT / found[2]) if found else None
-    return files if files and all(file.is_file() for file in files) else None
+    return (paths.ROOT / found[1], paths.ROOT / found[2]) if found else None
+
+
+def others_of(header: str) -> dict[str, str]:
+    """What a header defines that is no parameter: modes, and constants of its own."""
+    found = re.findall(r"^[ \t]*#[ \t]*define[ \t]+(\w+)[ \t]*((?:(?!/\*|//)\S)*)", header, re.MULTILINE)
+    return {name: text for name, text in found if name not in parameters() and name != "USERPARAMS_H"}
 
 
 def _bytes(text: str) -> bytes:
@@ -312,7 +317,10 @@ class Tuning:
         except ImportError:
             raise UserError("tomlkit is missing", "motor file", "start by make live, which installs it") from None
         motor, board = self.files
+        for file in self.files:
+            if not file.is_file():
+                raise UserError("the header's file is not there", str(paths.shown(file)), "start make live with MOTOR=name, or save userparams.h")
         changed = {name: text for name, (text, _) in list(self.changed.items())}
-        text, left = motor_text(motor, board_file.load(str(board)), self.texts | changed)
+        text, left = motor_text(motor, board_file.load(str(board)), self.texts | changed, others_of(self.header))
         self.news.extend(f"not in the motor file: {each}" for each in left)
         return motor.name, text

@@ -339,6 +339,10 @@ class VirtualBoard:
         """userparams.h with what has been changed."""
         return tuned(self.tuning).saved()
 
+    def motor(self) -> tuple[str, str]:
+        """Name and text of the motor file with it."""
+        return tuned(self.tuning).motor()
+
     def loop(self) -> str:
         """The loop that was measured last."""
         return measured_loop(self.loops)
