@@ -119,7 +119,7 @@ void scope_init(scope_t *s)
     s->delay = 0;
 }
 
-static uint16_t word_at(const uint8_t *at)
+static NOINLINE uint16_t word_at(const uint8_t *at)
 {
     return (uint16_t)(at[0] | (uint16_t)(at[1] << 8));
 }
