@@ -291,6 +291,24 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     }
 }
 
+/** The rotor stands, and the drive pushes: does it go? A frame that was turned back settles first, or its own voltage would be a rotor's. */
+static void held_push(drive_t *d, const drive_params_t *p, uint16_t moved)
+{
+    held_t *shaft = &d->run.held;
+    if (shaft->act == (uint16_t)HELD_WAITS) { /* else the frame is turned back first */
+        if (moved > (uint16_t)p->adaptation.emf_least_q12 && shaft->steps > HELD_ASK_STEPS / 2u) {
+            held_will(shaft, HELD_GOES_ON);
+            return;
+        }
+        if (shaft->steps <= HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) {
+            shaft->run_on = along_direction(d, -HELD_PULL_ANGLE);
+            held_will(shaft, HELD_TURN_BACK);
+        }
+    }
+    shaft->turned_q12 = 0; /* the load is what flows, and it grows */
+    observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
+}
+
 /** The angle stands. */
 static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
@@ -315,18 +333,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     case HELD_ASKED: held_compare(d, p, emf, moved); break;
     case HELD_STANDS:
     default:
-        if (shaft->act == (uint16_t)HELD_WAITS) { /* else the frame is turned back first */
-            if (moved > most && shaft->steps > HELD_ASK_STEPS) {
-                held_will(shaft, HELD_GOES_ON);
-                break;
-            }
-            if (shaft->steps <= HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) {
-                shaft->run_on = along_direction(d, -HELD_PULL_ANGLE);
-                held_will(shaft, HELD_TURN_BACK);
-            }
-        }
-        shaft->turned_q12 = 0; /* the load is what flows, and it grows */
-        observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
+        held_push(d, p, moved);
         break;
     }
 }
