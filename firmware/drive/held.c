@@ -275,7 +275,6 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     uint16_t doubts = held_doubts(d, p, emf);
-
     held_follow_lag(shaft, &d->run, emf);
     if (shaft->phase != (uint16_t)HELD_NOT) {
         if (held_is_over(d, p)) {
@@ -315,7 +314,6 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     held_t *shaft = &d->run.held;
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
     const int16_t base_q12 = (int16_t)((shaft->phase == (uint16_t)HELD_SETTLES) ? 0 : shaft->emf_q12.q);
-
     shaft->turned_q12 = held_less(shaft->turned_q12, held_less(base_q12, emf.q));
     switch (shaft->phase) {
     case HELD_SETTLES:
@@ -331,10 +329,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
         shaft->emf_q12 = emf;
         break;
     case HELD_ASKED: held_compare(d, p, emf, moved); break;
-    case HELD_STANDS:
-    default:
-        held_push(d, p, moved);
-        break;
+    default: held_push(d, p, moved); break; /* HELD_STANDS */
     }
 }
 
@@ -342,7 +337,6 @@ void held_step(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
     const dq_t emf = estimator_emf(&d->run.estimator);
-
     if (shaft->phase == (uint16_t)HELD_NOT && d->run.stall_steps == 0u && observer_gate_is_closed(&d->run.observer)) {
         shaft->load = qm_hi(d->run.observer.load_q16); /* as a rule: at its speed, and nothing changes fast */
         shaft->lag_q12 = 0;
