@@ -48,7 +48,7 @@ def motor_text(path: Path, board: BoardFile, values: Mapping[str, str], others: 
         wrong = {name: value for name, value in _different(path, text, board, values).items() if name not in FACTS and _is_number(value)}
         if not wrong:
             break
-        text = _with_rows(path, text, {f"tune.{name}": (_round(number_of(value)), "") for name, value in wrong.items()})
+        text = _with_rows(path, text, {f"tune.{name}": _round(number_of(value)) for name, value in wrong.items()})
     unused = {"I2T_TIME_SEC"} if values.get("I2T_CURRENT_A") == "0" else set()
     wanted = {name: value for name, value in {**values, **(others or {})}.items() if name not in unused}
     left = _left(design(_motor(path, text), board).params, wanted)
@@ -142,7 +142,7 @@ def _with_facts(path: Path, text: str, changed: Mapping[str, str], values: Mappi
         low, high = motor.spread.get(of, (0.0, 0.0))
         if name in facts and high and (not low <= facts[name] * unit <= high or "NOPOLESPAIRS" in facts):
             rows[f"spread.{key}"] = (None, "") # the loops hold for what is measured now
-    return _with_rows(path, text, {key: ({"value": value, **({"unit": unit} if unit else {}), "source": SOURCE} if value is not None else None, unit)
+    return _with_rows(path, text, {key: {"value": value, **({"unit": unit} if unit else {}), "source": SOURCE} if value is not None else None
                                    for key, (value, unit) in rows.items()})
 
 
@@ -182,10 +182,10 @@ def _round(value: float) -> int | float:
     return int(value) if value.is_integer() else value
 
 
-def _with_rows(path: Path, text: str, rows: Mapping[str, Row]) -> str:
+def _with_rows(path: Path, text: str, rows: Mapping[str, Any]) -> str:
     """The file with these rows, by table and key."""
     document = tomlkit.parse(text)
-    for key, (value, _) in rows.items():
+    for key, value in rows.items():
         table, _, name = key.partition(".")
         if table not in document:
             document.add(tomlkit.nl())
@@ -193,7 +193,7 @@ def _with_rows(path: Path, text: str, rows: Mapping[str, Row]) -> str:
         _put(document[table], name, value)
     changed = tomlkit.dumps(document)
     data = Document(path, changed).data
-    for key, (value, _) in rows.items():
+    for key, value in rows.items():
         table, _, name = key.partition(".")
         if data.get(table, {}).get(name) != value:
             raise UserError(f"[{table}] {name} cannot be changed", str(paths.shown(path)), f"write [{table}] once, each of its keys on a line, and try again")

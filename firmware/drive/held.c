@@ -295,7 +295,7 @@ static void held_push(drive_t *d, const drive_params_t *p, uint16_t moved)
 {
     held_t *shaft = &d->run.held;
     if (shaft->act == (uint16_t)HELD_WAITS) { /* else the frame is turned back first */
-        if (moved > (uint16_t)p->adaptation.emf_least_q12 && shaft->steps > HELD_ASK_STEPS / 2u) {
+        if (moved > (uint16_t)p->adaptation.emf_least_q12 && shaft->steps > HELD_REST_STEPS) {
             held_will(shaft, HELD_GOES_ON);
             return;
         }

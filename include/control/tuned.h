@@ -128,6 +128,7 @@
 #define HELD_TURNED_RAD 0.175 /* [rad] ten degrees, electrical, by what its back-EMF gained: so far no shaft that is held goes | loadsteps */
 #define HELD_PULL_ANGLE 182   /* [2^-16 turn] a degree a step, by which all of the current pulls a rotor that stands | loadsteps */
 #define HELD_PULL_STEPS 32u   /* [steps] 32 degrees: a load may have stopped it so far ahead of the frame | loadsteps */
+#define HELD_REST_STEPS 2u    /* [steps] of 16 periods that a frame that was turned back takes to settle | loadsteps */
 #define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */
 #define HELD_ASK_MOST_STEPS 32u /* [steps] of 16 periods, for a back-EMF too small to tell sooner | lowspeed */
 #define HELD_SLOW_STEPS 64u    /* [steps] of 16 periods, in which the heaviest rotor that was let go is faster than what follows | held */

@@ -79,7 +79,6 @@
 /* ---- What the running motor teaches ---- */
 /** The sum is the flux times the angle, E dt = psi d theta, with psi of the header; and more than what dead time may shake in four steps. */
 #define PARAM_TURNED_V PARAM_MAX(PARAM_F(HELD_TURNED_RAD) * 60.0F / (2.0F * PARAM_PI * PARAM_ERPM_PER_V) / (2.0F * PARAM_STEP_SEC), 2.0F * PARAM_F(ADAPTATION_EMF_SHARE) * PARAM_DEAD_TIME_V)
-
 #define PARAM_ADAPTATION_INIT \
     { \
         .rate_q16 = (int16_t)(PARAM_F(ADAPTATION_RATE) * (float)SLOW_ROUND_STEPS * PARAM_STEP_SEC * 65536.0F + 0.5F), \
