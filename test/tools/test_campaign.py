@@ -1,6 +1,7 @@
 """The campaign of injected faults: what is drawn, how an end is judged, that silence fails the command, and that an interrupted one goes on."""
 
 import csv
+import functools
 import json
 import os
 import signal
@@ -130,6 +131,20 @@ def test_a_speed_that_a_load_swings_is_judged_over_a_turn():
     assert verdict(plant__speed_rpm=swings).outcome == judge.SILENT
     assert verdict(replace(LIMITS, mean_s=0.1), plant__speed_rpm=swings).outcome == judge.RIDDEN
     assert verdict(replace(LIMITS, mean_s=0.1), plant__speed_rpm=lambda time_s: 0.93 * swings(time_s)).outcome == judge.SILENT
+    for part in (0.25, 0.5, 0.75): # the record ends in any phase of the swing
+        ends = functools.partial(lambda part, time_s: swings(time_s + 0.1 * part), part)
+        assert verdict(replace(LIMITS, mean_s=0.1), plant__speed_rpm=ends).outcome == judge.RIDDEN
+    late = replace(LIMITS, mean_s=0.1, settled_s=1.99)
+    assert verdict(late, plant__speed_rpm=after(1.93, 900.0, 1000.0)).outcome == judge.SILENT # what comes last counts
+
+
+def test_a_load_that_pulses_swings_the_slowest_speed_that_follows_by_its_share(bench):
+    for scene, rpm in (("braking", 151.0), ("accelerating", 800.0), ("half speed", 800.0)):
+        case = replace(CASES[0], kind="shaft: load that pulses", pulse=0.0, motor=HURST, scene=scene)
+        way = trial.scene(case, bench)
+        board = SimpleNamespace(get=lambda key: 800.0 if key == "fw.speed_ref_rpm" else 1.0)
+        rating = trial.rating_of(bench.library, bench.motor, board, way)
+        assert rating.speed_rpm == pytest.approx(1.4 * rpm if scene == "braking" else rpm, rel=0.01)
 
 
 def test_a_dip_that_is_over_within_a_second_is_ridden_through_and_a_later_one_is_silent():
@@ -201,6 +216,11 @@ def test_a_speed_that_is_off_by_as_much_as_no_firmware_can_know_is_a_class_of_it
     assert verdict(clock).outcome == judge.NO_EFFECT
     assert verdict(clock, plant__speed_rpm=after(0.6, -1100.0, 1000.0)).why == "turns backwards"
     assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0), plant__i_q=after(0.6, 8.0, 1.0)).outcome == judge.SILENT
+    falls = lambda clock, time_s: 1000.0 - 400.0 * clock * np.maximum(time_s - 0.5, 0.0) # noqa: E731 and its ramps are as slow
+    braking = running(plant__speed_rpm=functools.partial(falls, 1.0))
+    for share, outcome in ((0.9, judge.UNKNOWABLE), (0.7, judge.SILENT)):
+        slow = replace(LIMITS, unseen=judge.Unseen(clock=0.9))
+        assert verdict(slow, braking, plant__speed_rpm=functools.partial(falls, share)).outcome == outcome
     more = replace(LIMITS, unseen=judge.Unseen(more_rpm=50.0))
     assert verdict(more, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE # 56 + 50 rpm
     assert verdict(more, plant__speed_rpm=after(0.6, 1110.0, 1000.0)).outcome == judge.SILENT
@@ -250,6 +270,8 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
     kinds = ("sensors: current reads zero", "sensors: current offset", "sensors: current offset drifts", "sensors: current gain", "sensors: current noise",
              "power stage: transistor never turns on")
     assert unseen == dict.fromkeys(kinds, judge.Unseen(more_rpm=0.5 * np.pi * rating.dead_rpm)) | {"clock: crystal off frequency": judge.Unseen(clock=1.2)}
+    lost = injection.BY_NAME["interrupts: some lost"]
+    assert [lost.unseen(size, rating).clock for size in (0.02, 0.03, 0.031, 0.5)] == pytest.approx([0.98, 0.97, 1.0, 1.0])
     assert param_rows.number("PARAM_RS_MOST") == pytest.approx(injection.MOST_RESISTANCE - 1.0)
     gain = injection.BY_NAME["sensors: current gain"]
     assert [gain.unseen(size, rating).start_current for size in (1.5, 0.8, 0.625, 0.3)] == pytest.approx([1.0, 1.25, 1.6, 1.6])

@@ -33,7 +33,7 @@ class Rating:
     crystal_hz: float
     inertia_kgm2: float = 0.0
     speed_rpm: float = 0.0
-    """of the reference when it happens, at least the lowest"""
+    """the slowest reference from when it happens on, at least the lowest that there is"""
     dead_rpm: float = 0.0
     """from which deviation of the speed on dead time cannot be behind it (PARAM_LARGE_ERPM)"""
     start_dead: float = 0.0
@@ -121,6 +121,15 @@ def _as_dead_time(size: float, rating: Rating) -> Unseen:
     return Unseen(more_rpm=math.pi / 2.0 * rating.dead_rpm)
 
 
+def _as_slow_clock(size: float, rating: Rating) -> Unseen:
+    """The drive counts its time in interrupts: what is too few to be seen makes it as much slower."""
+    return Unseen(clock=1.0 - size) if size <= LOST_UNSEEN else Unseen()
+
+
+LOST_UNSEEN = 0.03
+"""Of the interrupts of a tenth of a second (LEAST_TICKS of firmware/board/firmware.c)."""
+
+
 def _as_warm_winding(size: float, rating: Rating) -> Unseen:
     """The same; and without a back-EMF, a signal that is too small looks like a resistance that is larger than the header's, and like dead time."""
     return replace(_as_dead_time(size, rating), start_current=min(max(1.0 / size, 1.0), MOST_RESISTANCE + rating.start_dead))
@@ -192,7 +201,7 @@ KINDS = (
     Kind("clock", "crystal off frequency", ("CLOCK", "INTERRUPT_RATE"), lambda r: (1.0 + _size(0.005, 0.3, True)(r)[0], ""),
          _sets("cpu.crystal_hz", "crystal_hz"), unseen=lambda size, rating: Unseen(clock=size)),
     Kind("interrupts", "some lost", ("INTERRUPT_RATE", "ADC_LOST", "ISR_OVERRUN"), _size(0.002, 0.6), _sets("fault.isr_lost_share"),
-         passes=0.3, weight=2.0),
+         passes=0.3, weight=2.0, unseen=_as_slow_clock),
     Kind("interrupts", "all lost", ("INTERRUPT_RATE", "ADC_LOST"), _one_of(1.0), _sets("cpu.isr_dropped"), passes=0.3, weight=0.5),
     Kind("interrupts", "late", ("INTERRUPT_RATE", "ISR_OVERRUN", "ADC_LOST"), _size(1.0, 45.0),
          lambda size, place, rating: {"fault.isr_late_us": size, "fault.isr_late_share": 0.02 if size > 20.0 else 0.3}, passes=0.3),

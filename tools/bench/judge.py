@@ -1,6 +1,6 @@
 """How a run with a fault ended, against the same run without it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,7 +33,7 @@ class Unseen:
     """What no firmware can know of a fault; docs/faults.md has the calculations."""
 
     clock: float = 1.0
-    """the speed is as many times as high, or less of it where a limit holds it back"""
+    """the speed is as many times as high, or less of it where a limit holds it back, and what changes it comes as much later"""
     more_rpm: float = 0.0
     """and so many rpm off"""
     start_current: float = 1.0
@@ -128,7 +128,9 @@ def _still_on(after: Trace, reference: Trace) -> str:
 def _wrong(after: Trace, reference: Trace, limits: Limits, unseen: Unseen = Unseen()) -> str:
     """What is wrong with a run that has raised no fault, but for what nobody can know; "" if nothing is."""
     speed, expected = _smooth(after, "plant.speed_rpm", limits), _smooth(reference, "plant.speed_rpm", limits)
-    ends = np.sort(np.vstack((expected, unseen.clock * expected)), axis=0)
+    drives_s = unseen.clock * (after.time_s - after.time_s[:1])
+    later = np.interp(drives_s, after.time_s - after.time_s[:1], expected) if len(expected) else expected
+    ends = np.sort(np.vstack((expected, unseen.clock * expected, unseen.clock * later)), axis=0)
     last, last_expected = _on_at_end(after), _on_at_end(reference)
     if last_expected and not last:
         return "stops without a code"
@@ -139,7 +141,7 @@ def _wrong(after: Trace, reference: Trace, limits: Limits, unseen: Unseen = Unse
     if _too_much_current(after, reference, limits, unseen.start_current):
         return "too much current"
     judged = after.time_s >= limits.settled_s
-    off_rpm = np.maximum(np.maximum(ends[0] - speed, speed - ends[1]), 0.0)[judged]
+    off_rpm = np.maximum(np.maximum(ends[0] - speed, speed - ends[-1]), 0.0)[judged]
     band_rpm = np.maximum(BAND_OF_SPEED * np.abs(ends).max(axis=0), BAND_OF_RATED * limits.rated_rpm)[judged] + unseen.more_rpm
     if last_expected and np.any(off_rpm > band_rpm) and not (limits.limited_is_right and limited(after, judged) > 0.5):
         return f"speed off by up to {np.max(off_rpm):.0f} rpm"
@@ -197,11 +199,13 @@ def _amplitude(trace: Trace) -> np.ndarray:
 
 
 def _smooth(trace: Trace, name: str, limits: Limits) -> np.ndarray:
+    """The mean around each row; near an end that of the last whole turn, for a part of one has another mean."""
     values = trace.column(name).astype(np.float64)
     rows = max(1, round(limits.mean_s / max(trace.period_s, 1e-6)))
     if len(values) < rows:
         return values
-    return np.convolve(np.pad(values, (rows // 2, rows - 1 - rows // 2), "edge"), np.ones(rows) / rows, "valid")
+    means = np.convolve(values, np.ones(rows) / rows, "valid")
+    return np.pad(means, (rows // 2, rows - 1 - rows // 2), "edge")
 
 
 def _speed_error_percent(after: Trace, reference: Trace, limits: Limits) -> float | None:
@@ -217,7 +221,7 @@ def _same(after: Trace, reference: Trace, limits: Limits) -> bool:
     """As if nothing had happened: states, speed and current."""
     if [value for _, value in after.changes("fw.state")] != [value for _, value in reference.changes("fw.state")]:
         return False
-    off_rpm = np.abs(_smooth(after, "plant.speed_rpm", limits) - _smooth(reference, "plant.speed_rpm", limits))
+    off_rpm = np.abs(np.subtract(*(_smooth(trace, "plant.speed_rpm", replace(limits, mean_s=MEAN_S)) for trace in (after, reference))))
     off_a = np.abs(_amplitude(after) - _amplitude(reference))
     return bool(np.max(off_rpm, initial=0.0) <= SAME_SPEED * limits.rated_rpm
                 and np.sqrt(np.mean(off_a ** 2)) <= SAME_CURRENT * limits.most_current_a)

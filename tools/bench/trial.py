@@ -74,6 +74,8 @@ class Scene:
     states: tuple[str, ...]
     end_s: float
     """not before this: a start is over and has settled"""
+    last_rpm: float
+    """the reference that the way leads to"""
 
 
 def scene(case: Case, bench: Bench) -> Scene:
@@ -115,7 +117,7 @@ def scene(case: Case, bench: Bench) -> Scene:
     plant = {"rng.seed": float(case.noise)} | _true_motor(case, bench, min(speed for speed in (first, second) if speed))
     scenario = Scenario(f"case {case.number}", f"{text}, {case.scene}", "", "", "", 60.0, events=sorted(events, key=lambda event: event.at_s),
                         rotor_deg=case.rotor_deg, plant=Values(plant, dict.fromkeys(plant, WHERE)))
-    return Scene(scenario, *begin, end_s)
+    return Scene(scenario, *begin, end_s, second or first)
 
 
 def _true_motor(case: Case, bench: Bench, rpm: float) -> dict[str, float]:
@@ -173,7 +175,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         _to_the_moment(session, way, case)
         injected_s = session.now_s
         state = bench.library.states.get(int(board.get("fw.state")), "?")
-        rating = rating_of(bench.library, bench.motor, board)
+        rating = rating_of(bench.library, bench.motor, board, way)
         unseen = case.what.unseen(case.size, rating)
         settled_s = settled(case, way.end_s + reversal_s(case, state, bench.library.params), injected_s, unseen.clock)
         end_s = settled_s + judge.JUDGE_S
@@ -199,11 +201,12 @@ def mean_s(case: Case, rating: injection.Rating) -> float:
     return max(judge.MEAN_S, 60.0 / rating.speed_rpm) if case.swings else judge.MEAN_S
 
 
-def rating_of(library: Library, motor: Part, board: Any) -> injection.Rating:
+def rating_of(library: Library, motor: Part, board: Any, way: Scene) -> injection.Rating:
     """What the sizes of faults are shares of, for the motor on this board."""
+    slowest_rpm = min(abs(board.get("fw.speed_ref_rpm")), way.last_rpm)
     return injection.Rating(param(library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(motor.path)).rated_torque_nm,
                             *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz", "mech.inertia_kgm2")),
-                            speed_rpm=max(abs(board.get("fw.speed_ref_rpm")), param(library.params, "MINIMUM_SPEED_RPM")),
+                            speed_rpm=max(slowest_rpm, param(library.params, "MINIMUM_SPEED_RPM")),
                             dead_rpm=dead_rpm(library.params), start_dead=start_dead(library.params))
 
 
