@@ -73,6 +73,8 @@ static void limit_currents(drive_t *d, const drive_params_t *p, const drive_samp
 {
     if (d->run.handover.offset != 0) {
         handover_decay(&d->run.handover);
+    } else {
+        d->run.handover.id_q13 = 0; /* a bit of it that flipped would stay */
     }
     limits_current(&d->run, p);
     limits_driving(d, p);

@@ -207,6 +207,14 @@ def test_too_little_speed_is_right_where_the_drive_names_the_limit_and_the_kind_
     assert verdict(allowed, **slow).outcome == judge.SILENT
 
 
+def test_a_start_that_waits_for_a_rotor_which_the_load_drives_too_fast_says_so_and_is_not_silent():
+    allowed = replace(LIMITS, limited_is_right=True)
+    waits = {"pwm__outputs_seen": after(0.6, 0.0, 63.0), "plant__speed_rpm": after(0.6, 5000.0, 1000.0)}
+    assert verdict(allowed, fw__limits=after(0.7, 128.0), **waits).outcome == judge.RIDDEN
+    for limits, named in ((LIMITS, after(0.7, 128.0)), (allowed, after(0.7, 1.0)), (allowed, 0.0)):
+        assert verdict(limits, fw__limits=named, **waits).why == "stops without a code"
+
+
 def test_a_speed_that_is_off_by_as_much_as_no_firmware_can_know_is_a_class_of_its_own():
     clock = replace(LIMITS, unseen=judge.Unseen(clock=1.1))
     assert verdict(clock, plant__speed_rpm=after(0.6, 1100.0, 1000.0)).outcome == judge.UNKNOWABLE

@@ -24,6 +24,8 @@ BACKWARDS_TURNS = 0.5
 """Mechanical turns against its direction that a motor may make: a rotor recoils when a block lets it go."""
 HOLDS_BACK = ("VOLTAGE", "CURRENT", "BRAKE", "RAMP_WAITS")
 """Reasons for a speed that is not the reference."""
+HOLDS_OFF = ("TOO_FAST",)
+"""Reasons for a start that waits."""
 SAME_SPEED, SAME_CURRENT = 0.003, 0.05
 """Of rated speed and most current: smaller differences are no effect."""
 
@@ -133,7 +135,8 @@ def _wrong(after: Trace, reference: Trace, limits: Limits, unseen: Unseen = Unse
     ends = np.sort(np.vstack((expected, unseen.clock * expected, unseen.clock * later)), axis=0)
     last, last_expected = _on_at_end(after), _on_at_end(reference)
     if last_expected and not last:
-        return "stops without a code"
+        waits = limits.limited_is_right and limited(after, after.time_s >= after.time_s[-1] - JUDGE_S, HOLDS_OFF) > 0.5
+        return "" if waits else "stops without a code"
     if last and not last_expected:
         return "runs where it should stand"
     if _backwards(after, reference, limits):
@@ -181,11 +184,11 @@ def _too_much_current(after: Trace, reference: Trace, limits: Limits, start_curr
     return len(over) >= rows and bool(np.max(np.convolve(over, np.ones(rows), "valid")) >= rows)
 
 
-def limited(trace: Trace, rows: np.ndarray) -> float:
-    """The share of the rows in which the drive names a limit that holds the speed back."""
+def limited(trace: Trace, rows: np.ndarray, reasons: tuple[str, ...] = HOLDS_BACK) -> float:
+    """The share of the rows in which the drive names one of these reasons."""
     if "fw.limits" not in trace or not np.any(rows):
         return 0.0
-    mask = sum(row.code for row in drive_tables.limits() if row.name in HOLDS_BACK)
+    mask = sum(row.code for row in drive_tables.limits() if row.name in reasons)
     return float(np.mean((trace.column("fw.limits")[rows].astype(np.int32) & mask) != 0))
 
 
