@@ -40,11 +40,7 @@ static int16_t catch_flux_q11(const drive_run_t *run, const estimator_params_t *
 {
     int32_t inductive = (qm_mulsu(i_q14, run->model.ls_q16) >> 15) * (1 << p->ls_exp);
     int32_t resistive = (qm_mulsu((int16_t)(sum_q11 - (i_q14 >> 4)), run->model.rs_q16) >> 15) * (1 << p->rs_exp);
-    int32_t flux = inductive + resistive;
-    if (flux > CATCH_MOST_FLUX_Q11) {
-        return CATCH_MOST_FLUX_Q11;
-    }
-    return (int16_t)((flux < -CATCH_MOST_FLUX_Q11) ? -CATCH_MOST_FLUX_Q11 : flux);
+    return qm_within(inductive + resistive, -CATCH_MOST_FLUX_Q11, CATCH_MOST_FLUX_Q11);
 }
 
 uint16_t catch_pause(const drive_run_t *run, const drive_params_t *p, alphabeta_t flux_q11, uint16_t samples)

@@ -28,8 +28,7 @@ speed_erpm_t handover_forced_erpm(const drive_t *d, const drive_params_t *p)
 {
     int32_t erpm = qm_mulss((int16_t)(d->forced.speed_q10 >> 8), p->observer.per_turn_q12) >> (11 - DEFER_DUTIES);
     if (DEFER_DUTIES) { /* the angle per period may be rounded up by more than a count of the largest speed */
-        erpm = (erpm > INT16_MAX) ? INT16_MAX : (erpm < -INT16_MAX) ? -INT16_MAX
-                                                                    : erpm;
+        erpm = qm_within(erpm, -INT16_MAX, INT16_MAX);
     }
     return (int16_t)erpm;
 }

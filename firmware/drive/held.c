@@ -42,11 +42,10 @@ static NOINLINE int16_t held_less(int16_t a, int16_t b)
     return qm_sub_limited(a, b);
 }
 
-/** Within the format. */
-static NOINLINE int16_t held_limited(int32_t sum)
+/** A sum within low..high. */
+static NOINLINE int16_t held_within(int32_t sum, int16_t low, int16_t high)
 {
-    return (int16_t)((sum > 32767) ? 32767 : (sum < -32767) ? -32767
-                                                            : sum);
+    return qm_within(sum, low, high);
 }
 
 /** |a - b|. */
@@ -84,9 +83,7 @@ static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uin
 {
     const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST,
                                            HELD_PERIOD_MOST); /* a quarter turn in a step */
-    const int32_t turned = qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps);
-    return (int16_t)((turned > HELD_QUARTER) ? HELD_QUARTER : (turned < -HELD_QUARTER) ? -HELD_QUARTER
-                                                                                       : turned);
+    return held_within(qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps), -HELD_QUARTER, HELD_QUARTER);
 }
 
 /** What a rotor has turned by in so many steps that is as fast as the back-EMF said when it was asked. */
@@ -176,7 +173,7 @@ static void held_has_turned(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     const int32_t sum = shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience));
-    shaft->turned_q12 = held_limited(sum);
+    shaft->turned_q12 = held_within(sum, -32767, 32767);
     held_turn_back(d, p, (int16_t)-held_by_sum(&d->run, p));
     held_go_on(d, p, held_speed(&d->run, emf), d->run.observer.load_q16);
 }
@@ -223,9 +220,7 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
 /** R's change and more of it, which may be beyond the format, within its limits. */
 static q15_t held_rs(const adaptation_params_t *p, q15_t change, q15_t more)
 {
-    const int32_t sum = (int32_t)change + more;
-    return (int16_t)((sum > p->rs_most) ? p->rs_most : (sum < p->rs_least) ? p->rs_least
-                                                                           : sum);
+    return held_within((int32_t)change + more, p->rs_least, p->rs_most);
 }
 
 /** The rotor stands: all of the back-EMF is R i, and turned the angle while it seemed one. */
@@ -259,7 +254,7 @@ static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
     const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
     const int32_t lag = (int32_t)shaft->lag_q12 - (shaft->lag_q12 >> HELD_LAG_SHIFT) + shaft->emf_q12.q - emf.q - taken_back;
-    shaft->lag_q12 = held_limited(lag);
+    shaft->lag_q12 = held_within(lag, -32767, 32767);
 }
 
 /** 1 where a rotor that was asked is back at its speed, or may be asked again. */

@@ -130,6 +130,12 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
     return (x < low) ? low : x;
 }
 
+/** A sum within a word, limited to low..high. */
+QM_INLINE int16_t qm_within(int32_t x, int16_t low, int16_t high)
+{
+    return (int16_t)((x > high) ? high : (x < low) ? low : x);
+}
+
 /** x limited to low..high, its upper word. */
 QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
 {

@@ -356,9 +356,7 @@ static const uint16_t plus[PHASES] = { 0, 2, 4 }, minus[PHASES] = { 3, 5, 1 };
 
 int16_t bringup_ma(current_q13_t i_q13)
 {
-    int32_t ma = qm_mulsu(i_q13, MA_PER_COUNT) >> MA_SHIFT;
-    return (int16_t)((ma > INT16_MAX) ? INT16_MAX : (ma < INT16_MIN) ? INT16_MIN
-                                                                     : ma);
+    return qm_within(qm_mulsu(i_q13, MA_PER_COUNT) >> MA_SHIFT, INT16_MIN, INT16_MAX);
 }
 
 /** A signal's answer to a phase: half the difference of its two directions. */

@@ -119,8 +119,7 @@ void mode_profile_step(drive_t *d, const drive_params_t *p)
         profile_fade(f, PROFILE_FADE_SHIFT);
     } else if (profile_may_learn(&d->run)) {
         const int32_t error_q16 = qm_mulss(qm_sub_limited(c->reference_erpm, speed), p->speed_kp_q13) >> 10;
-        profile_learn(f, pp, shaft, (int16_t)((error_q16 > pp->error_most_q16) ? pp->error_most_q16 : (error_q16 < -pp->error_most_q16) ? -pp->error_most_q16
-                                                                                                                                        : error_q16));
+        profile_learn(f, pp, shaft, qm_within(error_q16, (int16_t)-pp->error_most_q16, pp->error_most_q16));
     } else { /* a ramp, or no voltage: what was learned stays */
     }
     f->reference_erpm = c->reference_erpm;
