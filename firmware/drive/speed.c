@@ -52,10 +52,8 @@ void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;
     int16_t gain, reference = qm_abs(run->control.reference_erpm), speed = qm_abs(observer_speed(o));
-    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, (int16_t)(run->control.ref_q13.q - mode_profile_current(run)));
-    if (speed_swings(run)) { /* a load that pulses: the quick rate follows it */
-        o->rate_q16 = observer_between(0, p->observer.fast_q16, o->share_q15);
-    }
+    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, (int16_t)(run->control.ref_q13.q - mode_profile_current(run)),
+                      speed_swings(run));
     gain = observer_between(p->speed_kp_q13, p->speed_kp_fast_q13, o->fast_share_q15);
     run->control.speed_kp_q13 = observer_between(0, gain, observer_twice(o->share_q15)); /* at low speed a light rotor needs it more than the rates */
 }
