@@ -217,12 +217,6 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     }
 }
 
-/** R's change and more of it, which may be beyond the format, within its limits. */
-static q15_t held_rs(const adaptation_params_t *p, q15_t change, q15_t more)
-{
-    return held_within((int32_t)change + more, p->rs_least, p->rs_most);
-}
-
 /** The rotor stands: all of the back-EMF is R i, and turned the angle while it seemed one. */
 static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
 {
@@ -238,7 +232,7 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
             shaft->run_on = held_as_asked(run, p, (uint16_t)(shaft->doubted_steps + 1u));
             held_will(shaft, HELD_TURN_BACK);
         }
-        run->adaptation.rs_q31 = (int32_t)held_rs(&p->adaptation, qm_hi(run->adaptation.rs_q31), share) * 65536;
+        run->adaptation.rs_q31 = (int32_t)held_within((int32_t)qm_hi(run->adaptation.rs_q31) + share, p->adaptation.rs_least, p->adaptation.rs_most) * 65536;
         drive_update_model(run, p, run->control.reference_erpm);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
         run->estimator.e_q_q28 = 0;

@@ -183,7 +183,7 @@ void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b)
 void states_start_step(drive_t *d, const drive_params_t *p)
 {
     d->run.control.sample_shift_q13 = 0; /* as at rest, or a bit of it that flipped would stay */
-    if (!d->command.run) { /* letting go is harmless at these speeds */
+    if (!d->command.run) {               /* letting go is harmless at these speeds */
         drive_enter(d, DRIVE_STOPPED);
     } else if (d->state == (uint16_t)DRIVE_ALIGN) {
         startup_align(d, p);

@@ -133,7 +133,8 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
 /** A sum within a word, limited to low..high. */
 QM_INLINE int16_t qm_within(int32_t x, int16_t low, int16_t high)
 {
-    return (int16_t)((x > high) ? high : (x < low) ? low : x);
+    return (int16_t)((x > high) ? high : (x < low) ? low
+                                                   : x);
 }
 
 /** x limited to low..high, its upper word. */
