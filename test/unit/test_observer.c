@@ -190,6 +190,30 @@ void test_rate_follows_load_innovation_and_speed(void)
     TEST_ASSERT_EQUAL_INT16(QUIET - 1, rate_at(INT16_MIN, 0, 0));
 }
 
+void test_a_load_that_pulses_is_followed_at_the_quick_rate_as_far_as_there_is_load(void)
+{
+    enum { QUIET = GOLDEN_OBSERVER_QUIET_Q16, LOADED = GOLDEN_OBSERVER_LOADED_Q16, QUICK = GOLDEN_OBSERVER_FAST_Q16 };
+    static const struct {
+        const char *what;
+        int16_t ref_erpm, load;
+        q15_t quick;
+        int16_t rate;
+    } cases[] = {
+        { "without load", 5000, 0, 0, QUIET },
+        { "up to a small load", 5000, 103, 0, QUIET },
+        { "halfway", 5000, 103 + 51, 0, (QUIET + LOADED) / 4 + QUICK / 2 },
+        { "under load", 5000, 206, 0, QUICK },
+        { "at half the speed", 1222, 206, 0, QUICK },
+        { "and a quarter", 611, 206, 0, QUICK / 2 },
+        { "without load after a large innovation", 5000, 0, 32767, QUICK },
+    };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        (void)rate_at(cases[n].ref_erpm, cases[n].load, cases[n].quick);
+        observer_schedule(&o, p, cases[n].ref_erpm, -8000, 1);
+        TEST_ASSERT_INT16_WITHIN_MESSAGE(10 + cases[n].rate / 60, cases[n].rate, o.rate_q16, cases[n].what); /* the slope is rounded, and counts twice */
+    }
+}
+
 void test_a_large_innovation_is_smaller_under_load_and_larger_at_speed(void)
 {
     static const int16_t cases[][3] = { /* speed, load, and from where on an innovation is large */
@@ -208,7 +232,7 @@ void test_the_longer_large_innovations_go_on_the_larger_they_must_be(void)
     static const uint16_t cases[][2] = { { 0, 149 }, { 4, 151 }, { 128, 223 }, { 256, 298 }, { 4000, 2477 } };
     for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
         o.gate_level = cases[n][0];
-        (void)rate_at(0, 0);
+        (void)rate_at(0, 0, 0);
         TEST_ASSERT_INT16_WITHIN_MESSAGE(2, cases[n][1], o.gate_erpm, golden_row(n));
     }
     TEST_ASSERT_EQUAL_INT16(32767, observer_gate(20000, 256));
@@ -221,20 +245,20 @@ void test_is_quick_after_a_large_innovation_and_calm_50_ms_later(void)
         uint16_t steps = 0;
         balanced(0, (int16_t)(direction * 2500), 0);
         TEST_ASSERT_TRUE(observer_gate_is_closed(&o));
-        run(1, 2500, 0);
+        run(1, 2500, 0, 0);
         TEST_ASSERT_EQUAL_INT16(0, o.fast_share_q15);
         observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500 + 400), 0);
-        run(1, 2500, 0);
+        run(1, 2500, 0, 0);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(0, o.fast_share_q15, "the start is unrest");
         observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500 + 400), 0);
         o.gate_level = 0;
-        run(1, 2500, 0);
+        run(1, 2500, 0, 0);
         TEST_ASSERT_EQUAL_INT16(32767, o.fast_share_q15);
         TEST_ASSERT_FALSE(observer_gate_is_closed(&o));
         observer_preset(&o, p, shaft_rho_q32, (int16_t)(direction * 2500), 0);
         o.fast_share_q15 = 32767;
         while (!observer_gate_is_closed(&o)) {
-            run(1, 2500, 0);
+            run(1, 2500, 0, 0);
             steps++;
         }
         TEST_ASSERT_UINT16_WITHIN(2, 133, steps); /* 0.4 ms each */
@@ -444,7 +468,7 @@ void test_innovation_is_rounded_to_the_nearest(void)
     int32_t sum = 0;
     uint32_t turned;
     for (turned = 0; turned < UINT32_C(655360); turned += 640u) { /* ten counts up, ten down */
-        sum += innovation(0, turned, 0) + innovation(turned, 0);
+        sum += innovation(0, turned, 0) + innovation(turned, 0, 0);
     }
     TEST_ASSERT_INT32_WITHIN(20, 0, sum); /* of 2048 */
     TEST_ASSERT_EQUAL_INT16(0, innovation(0, 32767, 0));
@@ -494,7 +518,7 @@ void test_speed_ends_at_32700_and_load_at_its_largest(void)
             TEST_ASSERT_TRUE(direction * observer_speed(&o) <= 32700 && direction * observer_speed(&o) >= 32000);
         }
         TEST_ASSERT_EQUAL_INT16((direction > 0) ? 32700 : -32700, observer_speed(&o));
-        observer_preset(&o, p, 0, 0);
+        observer_preset(&o, p, 0, 0, 0);
         for (n = 0; n < 100u; n++) { /* always a quarter of a turn further behind */
             observer_schedule(&o, p, 5000, 0, 0);
             observer_step(&o, p, qm_turn_sub(o.rho_q32, (direction > 0) ? UINT32_C(0x40000000) : UINT32_C(0xC0000000)), 0);
@@ -513,7 +537,7 @@ void test_speed_and_load_keep_their_fractions_up_to_their_ends(void)
     TEST_ASSERT_EQUAL_INT32(1 - FASTEST_Q16, observer_sum(5 - FASTEST_Q16, -4));
     EACH_DIRECTION(direction) {
         int32_t load_q16 = direction * (INT32_C(65536) * GOLDEN_OBSERVER_LOAD_MAX - 1000);
-        balanced(0, 0);
+        balanced(0, 0, 0);
         o.load_q16 = load_q16;
         observer_step(&o, p, shaft_rho_q32, (int16_t)(direction * 5120)); /* no rate: nothing corrects it */
         TEST_ASSERT_EQUAL_INT32(load_q16, o.load_q16);
