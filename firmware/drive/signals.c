@@ -258,8 +258,9 @@ uint16_t signals_offset(signals_t *s, const drive_t *d, const drive_params_t *p)
         s->emf_ms++;
         return (uint16_t)FAULT_NONE;
     } else {
+        const uint16_t most_q12 = (uint16_t)(p->adaptation.emf_least_q12 << (qm_beyond(d->run.control.i_q13.q, SIGNALS_FLOWS_Q13) ? 0 : 1));
         const uint32_t ends = 2u * (uint32_t)(uint16_t)qm_abs(emf.q); /* the turn's ends are a millisecond wide: at most sqrt 2 of it on both axes */
-        s->emf_stood = (uint16_t)(signals_beat(&s->emf_q12) > ends + qm_muluu(s->emf_ms, (uint16_t)p->adaptation.emf_least_q12));
+        s->emf_stood = (uint16_t)(signals_beat(&s->emf_q12) > ends + qm_muluu(s->emf_ms, most_q12));
     }
     s->emf_q12.cosine = 0;
     s->emf_q12.sine = 0;

@@ -166,6 +166,7 @@
 #define SIGNALS_MOST_TIMES 2        /* [1] a deviation counts as twice its limit at most: then it may last 0.35 s | campaign */
 #define SIGNALS_MEAN_SHIFT 9        /* [shift] its mean is one over 512 ms | campaign */
 #define SIGNALS_TURNS_MS 256u       /* [ms] from here on a whole turn ends the sum of back-EMF: angles that are wrong at its ends count less and less | campaign */
+#define SIGNALS_FLOWS_Q13 96       /* [Q13 A] six steps of the converter: where less flows one of them leaves up to a fifth of dead time's voltage more | campaign */
 #define SIGNALS_TURN_ERPM 6000      /* [erpm] faster turns have fewer than ten looks each, and looks that meet the same angles again would sum up | campaign */
 #define SIGNALS_SAMPLES 64u         /* [samples] of the phases' currents that are compared, some 62 ms | run SCENARIO=fault_open_phase */
 

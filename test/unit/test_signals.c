@@ -230,6 +230,12 @@ static uint16_t ms_until_offset(int16_t alpha_q12, int16_t beta_q12, uint16_t st
     return ms_until_offset_at(1050, alpha_q12, beta_q12, step);
 }
 
+/** Half of the range: a step of the converter is nothing beside it. */
+static void current_flows(void)
+{
+    drive.run.control.i_q13.q = 4096;
+}
+
 /** Two sums, or three where the first one began within a turn. */
 static void expect_offset_found(int16_t alpha_q12, int16_t beta_q12, uint16_t step)
 {
@@ -244,14 +250,34 @@ void test_a_back_emf_that_stands_in_the_stator_is_found_within_a_second_whatever
         const uint16_t step = (sign > 0) ? TURN_STEP : (uint16_t)(0u - TURN_STEP);
         EACH_DIRECTION(side) {
             setUp();
+            current_flows();
             expect_offset_found((int16_t)(side * above), 0, step);
             setUp();
+            current_flows();
             expect_offset_found(0, (int16_t)(side * above), step);
             setUp();
+            current_flows();
             TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset((int16_t)(side * below), 0, step));
             setUp();
+            current_flows();
             TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(0, (int16_t)(side * below), step));
         }
+    }
+}
+
+/** A step of the converter then is up to a third of the current, and an offset by half of it leaves another fifth of dead time's voltage. */
+void test_where_hardly_any_current_flows_twice_as_much_may_stand(void)
+{
+    const int16_t between = (int16_t)(params.adaptation.emf_least_q12 + ENDS_Q12 + 6), above = (int16_t)(between + params.adaptation.emf_least_q12);
+    EACH_DIRECTION(sign) {
+        drive.run.control.i_q13.q = (int16_t)(sign * SIGNALS_FLOWS_Q13);
+        TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(between, 0, TURN_STEP));
+        setUp();
+        drive.run.control.i_q13.q = (int16_t)(sign * SIGNALS_FLOWS_Q13);
+        expect_offset_found(above, 0, TURN_STEP);
+        setUp();
+        drive.run.control.i_q13.q = (int16_t)(sign * (SIGNALS_FLOWS_Q13 + 1));
+        expect_offset_found(between, 0, TURN_STEP);
     }
 }
 
@@ -302,6 +328,7 @@ void test_one_sum_alone_is_none_and_the_next_is_summed_anew(void)
 {
     const alphabeta_t stands_q12[] = { { (int16_t)(3 * params.adaptation.emf_least_q12), 0 }, { 0, 0 } };
     uint16_t ms;
+    current_flows();
     drive.run.observer.omega_q16 = 1050 * 65536;
     for (ms = 0; ms < 3000u; ms++) {
         TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, offset_look((angle_t)(ms * TURN_STEP), 700, stands_q12[(ms / 286u) & 1u]));
@@ -311,6 +338,7 @@ void test_one_sum_alone_is_none_and_the_next_is_summed_anew(void)
 void test_a_start_s_d_current_an_angle_that_stands_and_a_turn_without_end_are_no_whole_turns(void)
 {
     const int16_t above = (int16_t)(2 * params.adaptation.emf_least_q12);
+    current_flows();
     drive.run.handover.id_q13 = 10;
     TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(above, 0, TURN_STEP));
     drive.run.handover.id_q13 = 0;
@@ -320,6 +348,7 @@ void test_a_start_s_d_current_an_angle_that_stands_and_a_turn_without_end_are_no
     TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(above, 0, 0));
     TEST_ASSERT_EQUAL_UINT16(3000, ms_until_offset(above, 0, 65536 / 1100));
     setUp();
+    current_flows();
     TEST_ASSERT_UINT16_WITHIN(300, 1800, ms_until_offset(above, 0, 65536 / 900));
 }
 
