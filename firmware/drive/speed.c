@@ -52,8 +52,7 @@ void speed_schedule(drive_run_t *run, const drive_params_t *p)
 {
     observer_t *o = &run->observer;
     int16_t gain, reference = qm_abs(run->control.reference_erpm), speed = qm_abs(observer_speed(o));
-    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, (int16_t)(run->control.ref_q13.q - mode_profile_current(run)),
-                      speed_swings(run));
+    observer_schedule(o, &p->observer, (speed > reference) ? speed : reference, (int16_t)(run->control.ref_q13.q - mode_profile_current(run)));
     gain = observer_between(p->speed_kp_q13, p->speed_kp_fast_q13, o->fast_share_q15);
     run->control.speed_kp_q13 = observer_between(0, gain, observer_twice(o->share_q15)); /* at low speed a light rotor needs it more than the rates */
 }
@@ -118,7 +117,7 @@ void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_e
     const int16_t most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
     int16_t before = qm_abs(before_erpm);
     int32_t trim_q26 = c->iq_trim_q26;
-    speed_remember_swing(c, error, qm_beyond(error, before >> (SPEED_SWING_SHIFT + SPEED_SWING_OUT_SHIFT * swings)));
+    speed_remember_swing(c, error, qm_beyond(error, before >> SPEED_SWING_SHIFT));
     if (c->reference_erpm != before_erpm || (!swings && (qm_beyond(error, before >> SPEED_TRIM_ERROR_SHIFT) || !speed_is_calm(run, iq_q13)))) {
         trim_q26 -= trim_q26 >> SPEED_TRIM_LEAK_SHIFT;
     } else if (swings || !speed_load_moves_against(run, error)) {

@@ -79,9 +79,8 @@ int16_t observer_gate(int16_t calm_erpm, uint16_t gate_level);
 /** As much unrest as at the hand-over, at least. */
 void observer_raise_gate(observer_t *o);
 
-/** The rate for the next step. @param speed magnitude of the speed reference @param iq_q13 q current asked for, above -32768
- *  @param swings 1 with a load that pulses: the quick rate follows it as far as there is load */
-void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t speed, current_q13_t iq_q13, uint16_t swings);
+/** The rate for the next step. @param speed magnitude of the speed reference @param iq_q13 q current asked for, above -32768 */
+void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t speed, current_q13_t iq_q13);
 
 /** By how much the angle has turned further in a step than the speed says, as a speed.
  *  The mean over the step, not a sample: a step of current gives the back-EMF a pulse and, over the derivative's eight samples, its

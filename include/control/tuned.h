@@ -41,7 +41,6 @@
 #define SPEED_TRIM_MOST_SHIFT 3     /* [shift] an eighth of the largest current at most | lowspeed */
 #define SPEED_TRIM_ERROR_SHIFT 3    /* [shift] an error beyond an eighth of the speed is no rest | loadsteps */
 #define SPEED_SWING_SHIFT 4         /* [shift] one beyond a sixteenth is a swing | pulse */
-#define SPEED_SWING_OUT_SHIFT 2u    /* [shift] and it goes on until a quarter of that: the quick rate makes less of it | pulse */
 #define SPEED_SWING_STEPS 152u      /* [steps] of 16 periods, 0.12 s at 20 kHz, that a swing to either side is remembered: a multiple of the following | pulse */
 #define SPEED_SWING_MASK 7u         /* [steps] less one: only so often is the error looked at, for a rotor that was nearly lost swings faster | loadsteps */
 

@@ -44,7 +44,7 @@ void setUp(void)
             begin(v.heavy); \
             observer_preset(&o, p, v.rho, v.ref, v.iq); \
         } else { \
-            observer_schedule(&o, p, qm_abs(v.ref), v.iq, 0); \
+            observer_schedule(&o, p, qm_abs(v.ref), v.iq); \
             observer_step(&o, p, v.rho, v.iq); \
         } \
         TEST_ASSERT_EQUAL_INT32_MESSAGE(v.omega, o.omega_q16, golden_row(n)); \
@@ -98,7 +98,7 @@ static void balanced(uint16_t heavy, int16_t erpm, int16_t load_q13)
 static void run(uint16_t steps, int16_t ref_erpm, int16_t iq_q13, int16_t load_q13)
 {
     while (steps-- != 0u) {
-        observer_schedule(&o, p, qm_abs(ref_erpm), iq_q13, 0);
+        observer_schedule(&o, p, qm_abs(ref_erpm), iq_q13);
         shaft_step(iq_q13, load_q13);
         observer_step(&o, p, shaft_rho_q32, iq_q13);
     }
@@ -150,7 +150,7 @@ static int16_t rate_at(int16_t ref_erpm, int16_t load_units, q15_t fast_share_q1
 {
     o.load_q16 = (int32_t)load_units * 65536;
     o.fast_share_q15 = fast_share_q15;
-    observer_schedule(&o, p, qm_abs(ref_erpm), -8000, 0); /* all of the load makes current */
+    observer_schedule(&o, p, qm_abs(ref_erpm), -8000); /* all of the load makes current */
     return o.rate_q16;
 }
 
@@ -188,30 +188,6 @@ void test_rate_follows_load_innovation_and_speed(void)
         }
     }
     TEST_ASSERT_EQUAL_INT16(QUIET - 1, rate_at(INT16_MIN, 0, 0));
-}
-
-void test_a_load_that_pulses_is_followed_at_the_quick_rate_as_far_as_there_is_load(void)
-{
-    enum { QUIET = GOLDEN_OBSERVER_QUIET_Q16, LOADED = GOLDEN_OBSERVER_LOADED_Q16, QUICK = GOLDEN_OBSERVER_FAST_Q16 };
-    static const struct {
-        const char *what;
-        int16_t ref_erpm, load;
-        q15_t quick;
-        int16_t rate;
-    } cases[] = {
-        { "without load", 5000, 0, 0, QUIET },
-        { "up to a small load", 5000, 103, 0, QUIET },
-        { "halfway", 5000, 103 + 51, 0, (QUIET + LOADED) / 4 + QUICK / 2 },
-        { "under load", 5000, 206, 0, QUICK },
-        { "at half the speed", 1222, 206, 0, QUICK },
-        { "and a quarter", 611, 206, 0, QUICK / 2 },
-        { "without load after a large innovation", 5000, 0, 32767, QUICK },
-    };
-    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
-        (void)rate_at(cases[n].ref_erpm, cases[n].load, cases[n].quick);
-        observer_schedule(&o, p, cases[n].ref_erpm, -8000, 1);
-        TEST_ASSERT_INT16_WITHIN_MESSAGE(10 + cases[n].rate / 60, cases[n].rate, o.rate_q16, cases[n].what); /* the slope is rounded, and counts twice */
-    }
 }
 
 void test_a_large_innovation_is_smaller_under_load_and_larger_at_speed(void)
@@ -273,7 +249,7 @@ void test_is_quick_after_a_large_innovation_and_calm_50_ms_later(void)
 static q15_t quick_after(uint32_t counts, q15_t before)
 {
     begin(0);
-    observer_schedule(&o, p, 0, 0, 0);
+    observer_schedule(&o, p, 0, 0);
     o.fast_share_q15 = before;
     o.gate_erpm = 100;
     observer_step(&o, p, counts << 16, 0);
@@ -297,16 +273,16 @@ void test_load_that_takes_no_current_counts_as_none(void)
         int16_t units = (int16_t)(direction * 4000), all = (int16_t)(direction * 8000), least = (int16_t)(GOLDEN_OBSERVER_LOAD_FROM * 65536LL / p->per_current_q16);
         o.load_q16 = (int32_t)units * 65536;
         o.fast_share_q15 = 0;
-        observer_schedule(&o, p, 10000, all, 0);
+        observer_schedule(&o, p, 10000, all);
         TEST_ASSERT_INT16_WITHIN(LOADED / 100, LOADED, o.rate_q16);
-        observer_schedule(&o, p, 10000, (int16_t)-all, 0);
+        observer_schedule(&o, p, 10000, (int16_t)-all);
         TEST_ASSERT_INT16_WITHIN(LOADED / 100, LOADED, o.rate_q16); /* of either sign */
-        observer_schedule(&o, p, 10000, (int16_t)(direction * (least - 2)), 0);
+        observer_schedule(&o, p, 10000, (int16_t)(direction * (least - 2)));
         TEST_ASSERT_INT16_WITHIN(2, QUIET, o.rate_q16);
-        observer_schedule(&o, p, 10000, (int16_t)(direction * (least + least / 2)), 0);
+        observer_schedule(&o, p, 10000, (int16_t)(direction * (least + least / 2)));
         TEST_ASSERT_INT16_WITHIN((LOADED - QUIET) / 20, (QUIET + LOADED) / 2, o.rate_q16);
         o.load_q16 = 0;
-        observer_schedule(&o, p, 10000, all, 0);
+        observer_schedule(&o, p, 10000, all);
         TEST_ASSERT_INT16_WITHIN(2, QUIET, o.rate_q16); /* nor does current that only makes speed */
     }
 }
@@ -325,10 +301,10 @@ static uint16_t wrong_after(uint16_t steps, uint32_t counts)
 void test_steps_with_more_than_dead_time_and_a_32nd_of_the_speed_are_counted_and_taken_back(void)
 {
     observer_params_t large_at_20000 = *p;
-    observer_schedule(&o, p, 3200, 8000, 0);
+    observer_schedule(&o, p, 3200, 8000);
     TEST_ASSERT_INT16_WITHIN(2, 2 * (149 + 100), o.wrong_erpm); /* without load dead time may make a light rotor hunt */
     o.load_q16 = 4000L * 65536;
-    observer_schedule(&o, p, 3200, 8000, 0);
+    observer_schedule(&o, p, 3200, 8000);
     TEST_ASSERT_INT16_WITHIN(2, 149 + 100, o.wrong_erpm);
     o.load_q16 = 0;
     TEST_ASSERT_EQUAL_UINT16(30, wrong_after(30, 200)); /* 458 erpm */
@@ -338,7 +314,7 @@ void test_steps_with_more_than_dead_time_and_a_32nd_of_the_speed_are_counted_and
     TEST_ASSERT_EQUAL_UINT16(20, wrong_after(10, (uint32_t)-400)); /* to either side */
     o.load_q16 = 0;
     large_at_20000.gate_erpm = 20000;
-    observer_schedule(&o, &large_at_20000, 3200, 8000, 0);
+    observer_schedule(&o, &large_at_20000, 3200, 8000);
     TEST_ASSERT_INT16_WITHIN(2, 32766, o.wrong_erpm); /* the end of its format */
 }
 
@@ -394,7 +370,7 @@ void test_large_innovations_to_both_sides_are_answered_only_from_calm(void)
 {
     EACH_DIRECTION(direction) {
         begin(0);
-        observer_schedule(&o, p, 0, 0, 0);
+        observer_schedule(&o, p, 0, 0);
         o.gate_level = 0;
         o.gate_erpm = 100;
         turned_by((int16_t)(direction * 400));
@@ -417,7 +393,7 @@ void test_large_innovations_to_both_sides_are_answered_only_from_calm(void)
 void test_one_side_after_the_other_with_calm_between_is_no_unrest(void)
 {
     begin(0);
-    observer_schedule(&o, p, 0, 0, 0);
+    observer_schedule(&o, p, 0, 0);
     o.gate_level = 0;
     o.gate_erpm = 100;
     turned_by(400);
@@ -520,7 +496,7 @@ void test_speed_ends_at_32700_and_load_at_its_largest(void)
         TEST_ASSERT_EQUAL_INT16((direction > 0) ? 32700 : -32700, observer_speed(&o));
         observer_preset(&o, p, 0, 0, 0);
         for (n = 0; n < 100u; n++) { /* always a quarter of a turn further behind */
-            observer_schedule(&o, p, 5000, 0, 0);
+            observer_schedule(&o, p, 5000, 0);
             observer_step(&o, p, qm_turn_sub(o.rho_q32, (direction > 0) ? UINT32_C(0x40000000) : UINT32_C(0xC0000000)), 0);
         }
         TEST_ASSERT_EQUAL_INT16(direction * GOLDEN_OBSERVER_LOAD_MAX, qm_hi(o.load_q16));

@@ -248,34 +248,6 @@ void test_swings_are_forgotten_in_an_eighth_of_a_second_and_not_remembered_for_l
     TEST_ASSERT_EQUAL_UINT16(0, drive.run.control.swing_steps);
 }
 
-void test_a_swing_goes_on_until_it_is_a_quarter_of_what_began_it(void)
-{
-    EACH_DIRECTION(sign) {
-        rig_closed(1, 10000);
-        (void)trim_of_swings(100, 10, (int16_t)(10000 - sign * 640), (int16_t)(10000 + sign * 640));
-        TEST_ASSERT_TRUE(speed_swings(&drive.run));
-        (void)trim_of_swings(100, 10, (int16_t)(10000 - sign * 170), (int16_t)(10000 + sign * 170));
-        TEST_ASSERT_TRUE(speed_swings(&drive.run));
-        (void)trim_of_swings(100, 10, (int16_t)(10000 - sign * 150), (int16_t)(10000 + sign * 150));
-        TEST_ASSERT_FALSE(speed_swings(&drive.run));
-    }
-}
-
-void test_the_observer_is_quick_where_the_speed_swings_under_load(void)
-{
-    int16_t calm;
-    rig_closed(1, 10000);
-    drive.run.control.ref_q13.q = 4000;
-    drive.run.observer.load_q16 = (int32_t)params.observer.load_max * 32768;
-    speed_schedule(&drive.run, &params);
-    calm = drive.run.observer.rate_q16;
-    TEST_ASSERT_INT16_WITHIN(params.observer.loaded_q16 / 100, params.observer.loaded_q16, calm); /* the slope is rounded */
-    drive.run.control.swing_steps = 4u * SPEED_SWING_STEPS;
-    speed_schedule(&drive.run, &params);
-    TEST_ASSERT_INT16_WITHIN(params.observer.fast_q16 / 100, params.observer.fast_q16, drive.run.observer.rate_q16);
-    TEST_ASSERT_GREATER_THAN(calm, drive.run.observer.rate_q16);
-}
-
 void test_swings_are_remembered_while_the_reference_moves_and_the_trim_is_forgotten_then(void)
 {
     rig_closed(1, 10000);
