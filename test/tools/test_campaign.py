@@ -143,7 +143,7 @@ def test_a_load_that_pulses_swings_the_slowest_speed_that_follows_by_its_share(b
         case = replace(CASES[0], kind="shaft: load that pulses", pulse=0.0, motor=HURST, scene=scene)
         way = trial.scene(case, bench)
         board = SimpleNamespace(get=lambda key: 800.0 if key == "fw.speed_ref_rpm" else 1.0)
-        rating = trial.rating_of(bench.library, bench.motor, board, way)
+        rating = trial.rating_of(bench.library, bench.motor, board, way.last_rpm)
         assert rating.speed_rpm == pytest.approx(1.4 * rpm if scene == "braking" else rpm, rel=0.01)
 
 

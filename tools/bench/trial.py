@@ -175,7 +175,7 @@ def run(case: Case, bench: Bench, tell: Callable[[float], None] = lambda seconds
         _to_the_moment(session, way, case)
         injected_s = session.now_s
         state = bench.library.states.get(int(board.get("fw.state")), "?")
-        rating = rating_of(bench.library, bench.motor, board, way)
+        rating = rating_of(bench.library, bench.motor, board, way.last_rpm)
         unseen = case.what.unseen(case.size, rating)
         settled_s = settled(case, way.end_s + reversal_s(case, state, bench.library.params), injected_s, unseen.clock)
         end_s = settled_s + judge.JUDGE_S
@@ -201,9 +201,10 @@ def mean_s(case: Case, rating: injection.Rating) -> float:
     return max(judge.MEAN_S, 60.0 / rating.speed_rpm) if case.swings else judge.MEAN_S
 
 
-def rating_of(library: Library, motor: Part, board: Any, way: Scene) -> injection.Rating:
+def rating_of(library: Library, motor: Part, board: Any, last_rpm: float | None = None) -> injection.Rating:
     """What the sizes of faults are shares of, for the motor on this board."""
-    slowest_rpm = min(abs(board.get("fw.speed_ref_rpm")), way.last_rpm)
+    reference_rpm = abs(board.get("fw.speed_ref_rpm"))
+    slowest_rpm = reference_rpm if last_rpm is None else min(reference_rpm, last_rpm)
     return injection.Rating(param(library.params, "MAXIMUM_CURRENT_A"), motor_file.load(str(motor.path)).rated_torque_nm,
                             *(board.get(key) for key in ("supply.voltage_v", "motor.rs_ohm", "motor.psi_vs", "cpu.crystal_hz", "mech.inertia_kgm2")),
                             speed_rpm=max(slowest_rpm, param(library.params, "MINIMUM_SPEED_RPM")),
