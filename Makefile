@@ -166,10 +166,11 @@ table2: setup-run ## [run] the eight rows of AN1292's Table 2 beside ours [MOTOR
 	@+$(ready)
 	@$(front_end) table2 $(options)
 
+drawn_or_full = $(if $(FULL),--full) $(if $(DRAW),--draw $(call quoted,$(DRAW))) $(if $(SEED),--seed $(call quoted,$(SEED))) \
+    $(if $(CASE),--case $(call quoted,$(CASE)))
 starts: setup-run ## [run] starts from every rotor angle under several loads, and with R, L, Kphi off; or drawn [FULL=1, DRAW=300 SEED=1 CASE=, MOTOR=name or all, BOARD= USERPARAMS= OUT=]
 	@+$(if $(every),$(every_motor),$(ready))
-	@$(if $(every),,$(front_end) starts $(if $(FULL),--full) $(if $(DRAW),--draw $(call quoted,$(DRAW))) $(if $(SEED),--seed $(call quoted,$(SEED))) \
-	    $(if $(CASE),--case $(call quoted,$(CASE))) $(options))
+	@$(if $(every),,$(front_end) starts $(drawn_or_full) $(options))
 
 motors: setup-run ## [your motor] every motor with its own header: 20, 50, 100 % of rated speed at half torque [BOARD= OUT=]
 	@$(tuner) motors $(board) $(out)
@@ -197,9 +198,9 @@ pulse: setup-run ## [run] a load that pulses with the shaft's angle, as that of 
 	@+$(if $(every),$(every_motor),$(ready))
 	@$(if $(every),,$(front_end) pulse $(options))
 
-held: setup-run ## [run] a shaft that is held and let go: how far it turns backwards, and what follows [FULL=1 MOTOR=name or all, BOARD= USERPARAMS= OUT=]
+held: setup-run ## [run] a shaft that is held and let go: how far it turns backwards, and what follows; or drawn [FULL=1, DRAW=300 SEED=1 CASE=, MOTOR=name or all, BOARD= USERPARAMS= OUT=]
 	@+$(if $(every),$(every_motor),$(ready))
-	@$(if $(every),,$(front_end) held $(if $(FULL),--full) $(options))
+	@$(if $(every),,$(front_end) held $(drawn_or_full) $(options))
 
 sensitivity: setup-run ## [tests] every number chosen by trial a fifth less and more: what moves, what is on an edge [ONLY="GATE_SHARE ..." ALL=1 MOTOR= BOARD= USERPARAMS= OUT=]
 	@+$(ready)

@@ -9,6 +9,7 @@ from tools.bench import cli, held_sweep
 from tools.bench.board import Library
 from tools.bench.held_sweep import Case, Held, Table
 from tools.common import board_file, motor_file, paths
+from tools.common.errors import UserError
 
 HURST = "hurst_dmb0224c10002"
 TABLE = Table.read(paths.TABLES / "held.toml")
@@ -53,6 +54,54 @@ def test_the_shaft_is_held_with_its_inertia_and_load_at_the_angle_and_let_go_in_
 
 def test_no_more_than_a_hundred_rpm_or_four_per_cent_of_rated_are_allowed_backwards():
     assert sweep().most_back_rpm == pytest.approx(112.0) and sweep(back_rpm=200.0).most_back_rpm == 200.0
+
+
+# ---- what is drawn -------------------------------------------------------------------------------------------------------
+def drawn(*arguments):
+    bench = sweep()
+    bench.ask(cli._parser().parse_args(["held", *arguments]))
+    return bench.cases()
+
+
+def test_a_number_always_draws_the_same_hold_and_another_number_or_seed_another():
+    first = drawn("--draw", "3", "--seed", "7")
+    assert len(first) == 3 and drawn("--case", "2", "--seed", "7") == [first[1]] and len(set(first)) == 3
+    assert drawn("--draw", "3", "--seed", "8")[1] != first[1]
+
+
+def test_three_hundred_holds_have_every_speed_load_inertia_and_length_and_a_motor_that_its_header_does_not_know():
+    cases = drawn("--draw", "300")
+    assert min(item.rpm for item in cases) < 300.0 and max(item.rpm for item in cases) > 3900.0
+    assert min(item.hold_s for item in cases) < 0.012 and max(item.hold_s for item in cases) > 0.9
+    assert {item.torque_nm == 0.0 for item in cases} == {item.brake_nm == 0.0 for item in cases} == {item.again_s == 0.0 for item in cases} == {True, False}
+    assert sum(item.inertia == 1.0 for item in cases) > 100 and max(item.inertia for item in cases) > 30.0
+    for name, part in (("R", 0.3), ("L", 0.25), ("Kphi", 0.2)):
+        factors = [getattr(item, name) for item in cases]
+        assert 1.0 - part <= min(factors) < 1.0 - 0.95 * part and 1.0 + 0.95 * part < max(factors) <= 1.0 + part
+
+
+def test_a_drawn_hold_is_a_brake_twice_with_another_motor():
+    bench, motor = sweep(), motor_file.load(HURST)
+    job = bench.job(replace(ITEM, R=1.2, Kphi=0.9, brake_nm=0.3, again_s=0.2, number=4))
+    held_s = job.scenario.measures[0].from_s
+    brakes = [(action.at_s - held_s, action.keys["load.constant_nm"]) for action in job.actions if "load.constant_nm" in action.keys and action.at_s >= held_s]
+    assert [at_s for at_s, _ in brakes] == pytest.approx([0.0, 0.1, 0.3, 0.4]) and [nm for _, nm in brakes] == [0.3, 0.04, 0.3, 0.04]
+    assert not [action for action in job.actions if "load.locked" in action.keys]
+    assert job.values["motor.rs_ohm"] == pytest.approx(1.2 * motor.rs_ohm) and ITEM.until_s == 0.1
+    assert job.scenario.duration_s == pytest.approx(held_s + 0.4 + bench.allowed_s(ITEM) + held_sweep.WATCH_S)
+
+
+@pytest.mark.parametrize("arguments, says", [(["--draw", "0"], "0 is no number of holds or of a hold"), (["--case", "0"], "0 is no number of holds")])
+def test_a_number_that_draws_nothing_is_refused_in_one_line(arguments, says):
+    with pytest.raises(UserError, match=says):
+        drawn(*arguments)
+
+
+def test_the_table_of_drawn_holds_says_how_many_are_well_and_what_followed():
+    bench = sweep()
+    bench.ask(cli._parser().parse_args(["held", "--draw", "3", "--seed", "5"]))
+    rows = [ROW | {"verdict": "ok"}, ROW | {"verdict": "ok", "fault": "STALL"}, ROW | {"verdict": "backwards", "backwards_rpm": 300.0}]
+    assert bench.text(rows) == "2 of 3 drawn holds are well, seed 5: 2 back at the speed, 1 stopped by name; at most 300 rpm backwards"
 
 
 # ---- what is measured ----------------------------------------------------------------------------------------------------

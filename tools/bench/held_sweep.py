@@ -1,18 +1,23 @@
-"""`held`: the shaft is held and let go. What is asked and what must hold is in tools/bench/scenarios/tables/held.toml."""
+"""`held`: the shaft is held and let go; or drawn holds, with a motor that the header does not know, by a brake, or twice. What is asked and what must
+hold is in tools/bench/scenarios/tables/held.toml."""
 
 import argparse
 import itertools
 import math
-from dataclasses import dataclass, replace
+import random
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from tools.common import motor_file
 from tools.common.trace import Trace
+from tools.common.board_keys import Values
 from . import case, picture, reach, report, simulate, sweep
+from .drawn_sweep import DrawnSweep
 from .expect import Outcome
 from .loadsteps import back_after
+from .robust import PARAMETERS
 from .run import Run
 from .scenario import BRAKE, Event, param, start_time_s
 from .sweep import within
@@ -48,6 +53,11 @@ class Table(sweep.Table):
     near_percent: float = within(0.01, 100.0)
     heavy_percent: float = within(0.01, 100.0)
     after_s: float = within(0.0, 60.0)
+    draw_resistance: float = within(0.0, 0.9)
+    draw_inductance: float = within(0.0, 0.9)
+    draw_kphi: float = within(0.0, 0.9)
+    draw_brake: list[float] = within(1.0, 100.0)
+    draw_again_s: list[float] = within(0.001, 60.0)
 
     def for_motor(self, motor: motor_file.Motor, params: dict[str, float]) -> "Table":
         """All of it is in shares of the rating."""
@@ -64,32 +74,46 @@ class Case:
     hold_s: float
     angle_deg: float
     """electrical, by which the rotor is held later"""
+    R: float = 1.0
+    L: float = 1.0
+    Kphi: float = 1.0
+    """true value / the header's, as the two before"""
+    brake_nm: float = 0.0
+    """of the brake that holds it; 0 = it is blocked"""
+    again_s: float = 0.0
+    """after the release it is held once more; 0 = never"""
+    number: int = 0
+    """of the draw"""
+
+    @property
+    def until_s(self) -> float:
+        """From the hold to the last release."""
+        return self.hold_s + (self.again_s + self.hold_s if self.again_s else 0.0)
 
     @property
     def kind(self) -> str:
+        if self.number:
+            return f"draw {self.number}: {self.plain}, R x{self.R:.2f}, L x{self.L:.2f}, Kphi x{self.Kphi:.2f}"
+        return self.plain
+
+    @property
+    def plain(self) -> str:
         return f"{self.rpm:g} rpm{f', {self.torque_nm:g} N m' if self.torque_nm else ''}, inertia x{self.inertia:g}"
 
     @property
     def name(self) -> str:
-        return f"{self.kind}, held for {self.hold_s:g} s at {self.angle_deg:g} deg"
+        by = f" by {self.brake_nm:.3g} N m" if self.brake_nm else ""
+        again = f", and {self.again_s:.3g} s later again" if self.again_s else ""
+        return f"{self.kind}, held for {self.hold_s:.3g} s{by} at {self.angle_deg:.3g} deg{again}"
 
 
-class Held(sweep.Sweep):
+class Held(DrawnSweep):
     """The sweep."""
 
     name, about, kind_of_table = "held", "the shaft is held and let go: how far backwards, and what follows", Table
-    keys = ("reference_rpm", "torque_nm", "inertia", "hold_s", "angle_deg", "backwards_rpm", "afterwards", "back_s", "fault", "fault_s", "current_max_a",
+    keys = ("reference_rpm", "torque_nm", "inertia", "hold_s", "angle_deg", "R", "L", "Kphi", "brake_nm", "again_s", "number", "backwards_rpm", "afterwards", "back_s", "fault", "fault_s", "current_max_a",
             "bus_max_v", "verdict")
-    full = False
-
-    @classmethod
-    def add_command(cls, commands: Any) -> argparse.ArgumentParser:
-        parser = super().add_command(commands)
-        parser.add_argument("--full", action="store_true", help="every angle of every hold")
-        return parser
-
-    def ask(self, options: argparse.Namespace) -> None:
-        self.full = options.full
+    what, all_of_it = "hold", "every angle of every hold"
 
     @property
     def rated(self) -> motor_file.Motor:
@@ -118,13 +142,29 @@ class Held(sweep.Sweep):
         return 0.0
 
     def cases(self) -> list[Case]:
-        """Every speed, load, inertia and hold; of the angles all, or one after the other."""
+        """Every speed, load, inertia and hold; of the angles all, or one after the other. Or else the drawn ones."""
+        if self.numbers:
+            return [self.drawn(number) for number in self.numbers]
         table, result = self.table, []
         kinds = [(rpm, torque) for rpm in self.speeds_rpm() for torque in dict.fromkeys((0.0, self.torque_nm(rpm)))]
         angles = [360.0 * number / int(table.angles) for number in range(int(table.angles))]
         for number, ((rpm, torque), inertia, hold_s) in enumerate(itertools.product(kinds, table.inertia_factors, table.holds_s)):
             result += [Case(rpm, torque, inertia, hold_s, angle) for angle in (angles if self.full else [angles[number % len(angles)]])]
         return result
+
+    def drawn(self, number: int) -> Case:
+        """The hold with this number: always the same. Speeds, inertias, holds and the time between two are drawn by their ratio."""
+        table, r = self.table, random.Random(f"held/{self.seed}/{number}")
+
+        def between(values: list[float]) -> float:
+            return min(values) * (max(values) / min(values)) ** r.random()
+        rpm = case.three_digits(between(self.speeds_rpm()))
+        torque_nm = case.three_digits(self.torque_nm(rpm) * r.choice((0.0, r.random(), 1.0)))
+        factors = [1.0 + r.uniform(-part, part) for part in (table.draw_resistance, table.draw_inductance, table.draw_kphi)]
+        most_nm = param(self.params, "MAXIMUM_CURRENT_A") * reach.torque_per_amp(self.motor.values.values)
+        inertia, hold_s, angle_deg = r.choice((1.0, between(table.inertia_factors))), between(table.holds_s), r.uniform(0.0, 360.0)
+        brake_nm, again_s = r.choice((0.0, most_nm * between(table.draw_brake))), r.choice((0.0, between(table.draw_again_s)))
+        return Case(rpm, torque_nm, inertia, hold_s, angle_deg, *factors, brake_nm, again_s, number)
 
     def inertia_kgm2(self, item: Case) -> float:
         return item.inertia * self.motor.values.values[INERTIA]
@@ -146,14 +186,21 @@ class Held(sweep.Sweep):
         held_s = settled_s + table.torque_over_s + table.settle_s + item.angle_deg / (6.0 * item.rpm * param(self.params, "NOPOLESPAIRS"))
         events += [Event(settled_s, "set", where, keys={INERTIA: self.inertia_kgm2(item)}, note=f"inertia x{item.inertia:g}"),
                    Event(settled_s, "set", where, keys={BRAKE: item.torque_nm}, over_s=table.torque_over_s),
-                   Event(held_s, "set", where, keys={LOCKED: 1.0}, note="the shaft is held"),
-                   Event(held_s + item.hold_s, "set", where, keys={LOCKED: 0.0}, note="and let go")]
-        end_s = held_s + item.hold_s + self.allowed_s(item) + WATCH_S
-        return simulate.prepare(case.scenario(item.name, table.title, events, item.rpm, held_s, end_s), self.library, self.motor, self.board)
+                   *self.hold(held_s, item), *(self.hold(held_s + item.hold_s + item.again_s, item) if item.again_s else [])]
+        plant = Values({key: ("factor", factor) for keys, factor in zip(PARAMETERS.values(), (item.R, item.L, item.Kphi)) for key in keys if factor != 1.0})
+        plant.where.update(dict.fromkeys(plant.values, where))
+        end_s = held_s + item.until_s + self.allowed_s(item) + WATCH_S
+        return simulate.prepare(case.scenario(item.name, table.title, events, item.rpm, held_s, end_s, plant=plant), self.library, self.motor, self.board)
+
+    def hold(self, at_s: float, item: Case) -> list[Event]:
+        """The shaft is blocked, or held by a brake, and let go."""
+        key, held, free = (BRAKE, item.brake_nm, item.torque_nm) if item.brake_nm else (LOCKED, 1.0, 0.0)
+        return [Event(at_s, "set", self.table.where, keys={key: held}, note="the shaft is held"),
+                Event(at_s + item.hold_s, "set", self.table.where, keys={key: free}, note="and let go")]
 
     def measured(self, run: Run, item: Case) -> dict[str, Any]:
         held_s, end_s = run.scenario.measures[0].from_s, run.scenario.duration_s
-        free_s = held_s + item.hold_s
+        free_s = held_s + item.until_s
         watched, free = run.trace.part(held_s, end_s), run.trace.part(free_s, end_s)
         reference = float(run.trace.part(held_s - BEFORE_S, held_s).column("fw.speed_ref_rpm").astype(np.float64).mean())
         faults = run.raised()
@@ -165,8 +212,7 @@ class Held(sweep.Sweep):
                 "current_max_a": float(current.max()), "bus_max_v": float(watched.column("bus.voltage_v").max())}
 
     def row(self, item: Case, job: simulate.Job, result: dict[str, Any]) -> dict[str, Any]:
-        row = {"name": item.kind, "reference_rpm": item.rpm, "torque_nm": item.torque_nm, "inertia": item.inertia, "hold_s": item.hold_s,
-               "angle_deg": item.angle_deg, **result}
+        row = {"name": item.kind, "reference_rpm": item.rpm, **asdict(item), **result}
         return row | {"afterwards": afterwards(row)}
 
     def verdict(self, item: Case, row: dict[str, Any]) -> str:
@@ -187,7 +233,11 @@ class Held(sweep.Sweep):
         return f"{self.table.title}: {len(rows)} rows"
 
     def text(self, rows: list[dict[str, Any]]) -> str:
-        """Speeds, loads and inertias down, holds across; of several angles the worst."""
+        """Speeds, loads and inertias down, holds across; of several angles the worst. Of drawn ones how many hold, and what followed."""
+        if self.numbers:
+            back, stopped = ([row for row in rows if bool(row["fault"]) == fault] for fault in (False, True))
+            return (f"{sum(row['verdict'] == 'ok' for row in rows)} of {len(rows)} drawn holds are well, seed {self.seed}: {len(back)} back at the speed, "
+                    f"{len(stopped)} stopped by name; at most {max(row['backwards_rpm'] for row in rows):.0f} rpm backwards")
         holds = list(dict.fromkeys(row["hold_s"] for row in rows))
         columns = tuple((hold_s, f"held\n{hold_s:g} s", "{}") for hold_s in holds)
         lines = []

@@ -20,7 +20,7 @@ from tools.common import motor_file
 from tools.common.board_keys import Values
 from tools.common.errors import UserError
 from . import case, reach, report, simulate, sweep
-from .draws import MOST_NUMBER
+from .drawn_sweep import DrawnSweep
 from .expect import Outcome
 from .robust import PARAMETERS
 from .scenario import BRAKE, START_MARGIN_S, param, start_time_s
@@ -148,36 +148,19 @@ class Case:
         return f"inertia x{self.inertia:g}" if self.is_heavy else f"{self.load_nm:g} N m"
 
 
-class Starts(sweep.Sweep):
+class Starts(DrawnSweep):
     """The sweep."""
 
     name, about, kind_of_table = "starts", "start from every rotor angle under several loads", Table
     keys = ("load_nm", "inertia", "rotor_deg", "R", "L", "Kphi", "number", "closed_after_s", "hand_over_rpm", "back_rpm", "overshoot_percent",
             "speed_error_percent", "angle_error_rms_deg", "beyond", "fault")
-    full, seed, numbers = False, 1, ()
+    what, all_of_it = "start", "every combination of R, L and Kphi from every angle"
 
     @classmethod
     def add_command(cls, commands: Any) -> argparse.ArgumentParser:
         parser = super().add_command(commands)
         parser.add_argument("--every-deg", type=float, help="step of the rotor's electrical angle; default from tables/starts.toml")
-        parser.add_argument("--full", action="store_true", help="every combination of R, L and Kphi from every angle")
-        parser.add_argument("--draw", type=int, metavar="COUNT", help="only drawn starts, so many")
-        parser.add_argument("--seed", type=int, default=1, help="of the draw; default 1")
-        parser.add_argument("--case", type=int, nargs="+", metavar="NUMBER", help="these drawn starts alone")
         return parser
-
-    @classmethod
-    def folder(cls, options: argparse.Namespace) -> str:
-        if not options.draw and not options.case:
-            return cls.name
-        return f"{cls.name}-draw-{options.seed}" + (f"-case-{min(options.case)}" if options.case else "")
-
-    def ask(self, options: argparse.Namespace) -> None:
-        for flag, value in (("--draw", options.draw), ("--case", min(options.case) if options.case else None)):
-            if value is not None and not 1 <= value <= MOST_NUMBER:
-                raise UserError(f"{value} is no number of starts or of a start", flag, f"choose 1 .. {MOST_NUMBER}")
-        self.full, self.seed = options.full, options.seed
-        self.numbers = sorted(set(options.case)) if options.case else range(1, (options.draw or 0) + 1)
 
     @classmethod
     def read(cls, options: argparse.Namespace) -> Table:
