@@ -323,6 +323,10 @@ def test_the_page_says_no_answer_and_what_is_old_is_grey(chromium):
         is_grey, hidden, text = inside(page, "views.all = [views.drive]; " + frame % "true" + told) # as the frames of a real board are
         assert is_grey and not hidden and text.startswith("no answer")
         assert inside(page, frame % "false" + told) == [False, True, ""]
+        text = inside(page, frame % "true" + "; warn('y axis: no number'); clearTimeout(warn.timer); tell(say.now); by('message').textContent")
+        assert text.startswith("no answer") # a warning is for a while
+        assert inside(page, "link.hush(false); " + frame % "true" + told)[1:] == [False, text] # after a new connection, too
+        assert inside(page, frame % "false" + told) == [False, True, ""]
         page.state("STOPPED")
         short.end()
         page.wait("return " + grey, "the values of a board that has ended stay", 5.0)

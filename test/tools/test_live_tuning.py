@@ -12,7 +12,8 @@ from live_browser import SIZE, Page, accessible
 from live_support import KEPT_DEFINES, kept_parts, parts, served, until
 from support import refusal
 
-from tools.bench.board import Library
+from tools.bench import command_common
+from tools.bench.board import Board, Library
 from tools.common import board_file, motor_file, paths
 from tools.common.param_rows import parameters, texts_of, with_values
 from tools.live import board
@@ -230,6 +231,17 @@ def test_a_board_that_was_switched_off_has_lost_them_and_gets_them_again(bench):
     assert {"tuning": bench.tuning.told()} in bench.messages
 
 
+def test_a_reset_brings_the_header_s_values_back_without_kept_ones_too():
+    board = Board(command_common.library_for(["PARAMS_IN_RAM"], None, None))
+    board.power_up()
+    start = board.parameter("IDREF_SPEED5")
+    board.write_parameter("IDREF_SPEED5", start - 0.5)
+    assert board.parameter("IDREF_SPEED5") == pytest.approx(start - 0.5, abs=1e-3)
+    board.power_up()
+    assert board.parameter("IDREF_SPEED5") == start
+    board.close()
+
+
 def test_values_of_the_board_that_are_not_the_header_s_are_counted(tmp_path):
     tuning = Tuning.of(header_with(tmp_path, SPEED_BANDWIDTH_HZ="9.5", UNDER_VOLTAGE_V="14") / "userparams.h", DEFINES, symbols(), symbols())
     own = Tuning.of(HEADER, DEFINES, symbols(), symbols())
@@ -359,6 +371,28 @@ def test_a_value_that_is_typed_is_in_the_board_unsaved_undone_by_one_key_and_sav
     waits(page, "document.getElementById('tuning-text').textContent === 'nothing is changed'", "not undone")
     assert item.get_attribute("value") == texts_of(HEADER.read_text(encoding="utf-8"))["SPEED_BANDWIDTH_HZ"]
     page.wait("return window.eval('foc33.frame.kept').unsaved === 0", "the board still has it")
+
+
+def test_ctrl_z_beside_the_card_undoes_too_and_in_a_field_of_another_card_it_does_not(page):
+    typed(page, "SPEED_BANDWIDTH_HZ", "9.5")
+    waits(page, "document.getElementById('tuning-text').textContent === 'unsaved: SPEED_BANDWIDTH_HZ'", "not changed")
+    press = "document.activeElement.blur(); %s.dispatchEvent(new KeyboardEvent('keydown', { key: 'z', ctrlKey: true, bubbles: true, cancelable: true }))"
+    assert page.run("return " + press.replace("document.activeElement.blur(); ", "") % "document.querySelector('#scope-card input')")
+    assert not page.run("document.activeElement.blur(); return " + press.split("; ", 1)[1] % "document.body") # the browser's own undo would change the field
+    waits(page, "document.getElementById('tuning-text').textContent === 'nothing is changed'", "not undone")
+    item = field(page, parameters()["SPEED_BANDWIDTH_HZ"].section, "SPEED_BANDWIDTH_HZ")
+    assert item.get_attribute("value") == texts_of(HEADER.read_text(encoding="utf-8"))["SPEED_BANDWIDTH_HZ"]
+
+
+def test_what_was_saved_is_no_longer_unsaved_until_it_changes_again(page):
+    typed(page, "SPEED_BANDWIDTH_HZ", "9.5")
+    waits(page, "document.getElementById('tuning-text').textContent === 'unsaved: SPEED_BANDWIDTH_HZ'", "not changed")
+    page.run("document.getElementById('save-header').click()")
+    waits(page, "document.getElementById('tuning-text').textContent === 'all changes are saved'", "still unsaved")
+    field(page, parameters()["SPEED_BANDWIDTH_HZ"].section, "SPEED_BANDWIDTH_HZ")
+    assert page.run("return [...document.querySelectorAll('.place')].map((place) => place.textContent).filter(Boolean)") == ["changed, saved"]
+    typed(page, "LOAD_BANDWIDTH_HZ", "100")
+    waits(page, "document.getElementById('tuning-text').textContent === 'unsaved: LOAD_BANDWIDTH_HZ'", "not changed")
 
 
 def test_a_field_that_is_emptied_has_the_header_s_value_again(page):

@@ -214,7 +214,7 @@ int probe_param_set(const char *name, double value)
 
 void probe_power_up(void)
 {
-#if PARAMS_KEPT
+#if defined(PARAMS_IN_RAM) || defined(TUNING) /* a reset of the chip brings the header's values back */
     static drive_params_t start_values;
     static int are_known;
     if (!are_known) {
@@ -222,6 +222,8 @@ void probe_power_up(void)
         are_known = 1;
     }
     board_params = start_values;
+#endif
+#if PARAMS_KEPT
     kept_command = (kept_t){0};
 #endif
 }

@@ -83,6 +83,7 @@ class LoopsView {
 
   // Both panels one above the other.
   draw() {
+    if (!this.told) { return; } // a firmware without the sine
     const svg = by("loops-plot"), { line, points, loop, speed_rpm: speed } = this.told, [gainHeight, phaseHeight] = LoopsView.HEIGHTS;
     svg.replaceChildren();
     if (!line.length || !svg.clientWidth) { return; }

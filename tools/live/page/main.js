@@ -2,16 +2,23 @@
 const foc33 = { frames: 0, frame: null, traces: 0, refused: "" }; // for those who look from outside
 let views = null, rotor = null, run = 0;
 
+// What holds until it is over; then "".
 function say(text) {
-  by("message").hidden = !text;
-  by("message").textContent = text;
+  say.now = text;
+  clearTimeout(warn.timer);
+  tell(text);
 }
 
-// For a while.
+// For a while; then what holds is there again.
 function warn(text) {
-  say(text);
+  tell(text);
   clearTimeout(warn.timer);
-  warn.timer = setTimeout(() => say(""), 6000);
+  warn.timer = setTimeout(() => tell(say.now ?? ""), 6000);
+}
+
+function tell(text) {
+  by("message").hidden = !text;
+  by("message").textContent = text;
 }
 
 // Without an answer the last values are grey, and no state is claimed.
@@ -20,8 +27,8 @@ function hush(on) {
   if (on) { views?.drive.unknown(); }
 }
 
-let silent = false;
-const link = new Link(take, say, hush);
+let silent = null; // null: the board has not said yet
+const link = new Link(take, say, (on) => { hush(on); silent = null; });
 const board = new BoardView((command) => link.send(command));
 
 function begin(hello) {
@@ -78,6 +85,7 @@ for (const what of ["scenario", "csv", "header", "motor", "loop"]) {
   by(`save-${what}`).addEventListener("click", async () => { // what cannot be saved says why, instead of an empty file
     const answer = await fetch(`/save/${what}${location.search}`);
     if (!answer.ok) { warn((await answer.text()).trim()); return; }
+    if (what === "header" || what === "motor") { views?.tuning.kept(); }
     save(await answer.blob(), /filename="(.*)"/.exec(answer.headers.get("Content-Disposition"))[1]);
   });
 }

@@ -3,7 +3,8 @@ class TuningView {
   static PLACES = { board: "changed, unsaved", build: "needs a build: in the saved header alone", unused: "this build does not ask for it: in the saved header alone" };
 
   constructor({ tuning }, send) {
-    Object.assign(this, { send, subjects: tuning.subjects, rows: new Map() });
+    Object.assign(this, { send, subjects: tuning.subjects, rows: new Map(), saved: {} });
+    document.onkeydown = null;
     by("tuning-fixed").hidden = !tuning.fixed;
     by("tuning-fixed").textContent = tuning.fixed ?? "";
     by("tuning-parts").hidden = Boolean(tuning.fixed);
@@ -14,8 +15,8 @@ class TuningView {
     by("tuning-subject").onchange = () => this.list();
     by("tuning-undo").onclick = () => send({ tune: "undo" });
     by("tuning-again").onclick = () => send({ tune: "again" });
-    by("tuning-card").onkeydown = (event) => { // in a field that somebody edits the browser undoes
-      const edited = event.target.tagName === "INPUT" && event.target.value !== event.target.dataset.shown;
+    document.onkeydown = (event) => { // in a field that somebody edits the browser undoes; elsewhere it would, too, in a field that somebody has left
+      const own = by("tuning-card").contains(event.target), edited = event.target.tagName === "INPUT" && (!own || event.target.value !== event.target.dataset.shown);
       if (event.key === "z" && (event.ctrlKey || event.metaKey) && !edited) { event.preventDefault(); send({ tune: "undo" }); }
     };
     this.set(tuning);
@@ -50,19 +51,26 @@ class TuningView {
     this.show();
   }
 
+  // A header or motor file was saved.
+  kept() {
+    this.saved = Object.fromEntries(Object.entries(this.told?.changed ?? {}).map(([name, { text }]) => [name, text]));
+    this.show();
+  }
+
   show() {
-    const { changed, undo, lost, foreign } = this.told, names = Object.keys(changed);
+    const { changed, undo, lost, foreign } = this.told, names = [...new Set([...Object.keys(changed), ...Object.keys(this.saved)])];
+    const unsaved = names.filter((name) => changed[name]?.text !== this.saved[name]);
     for (const [name, { input, place, header }] of this.rows) {
       const text = changed[name]?.text ?? header, edited = document.activeElement === input && input.value !== input.dataset.shown && !input.classList.contains("busy");
       if (!edited) { input.value = text; }
       input.dataset.shown = text;
       input.classList.remove("busy");
       input.classList.toggle("changed", name in changed);
-      place.textContent = TuningView.PLACES[changed[name]?.place] ?? "";
+      place.textContent = name in changed && changed[name].place === "board" && !unsaved.includes(name) ? "changed, saved" : TuningView.PLACES[changed[name]?.place] ?? "";
     }
     by("tuning-undo").disabled = !undo;
     by("tuning-again").hidden = !lost;
-    by("tuning-text").textContent = [names.length ? `unsaved: ${names.join(", ")}` : "nothing is changed", lost ? "the board has lost them, after a reset" : "",
+    by("tuning-text").textContent = [unsaved.length ? `unsaved: ${unsaved.join(", ")}` : names.length ? "all changes are saved" : "nothing is changed", lost ? "the board has lost them, after a reset" : "",
       foreign ? `${foreign} values of the board were not this header's before` : ""].filter(Boolean).join("; ");
     by("tuning-text").classList.toggle("bad", lost);
   }
