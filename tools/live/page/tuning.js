@@ -58,8 +58,8 @@ class TuningView {
   }
 
   show() {
-    const { changed, undo, lost, foreign } = this.told, names = [...new Set([...Object.keys(changed), ...Object.keys(this.saved)])];
-    const unsaved = names.filter((name) => changed[name]?.text !== this.saved[name]);
+    const { changed, undo, lost, foreign } = this.told, names = Object.keys(changed);
+    const unsaved = names.filter((name) => changed[name].text !== this.saved[name]);
     for (const [name, { input, place, header }] of this.rows) {
       const text = changed[name]?.text ?? header, edited = document.activeElement === input && input.value !== input.dataset.shown && !input.classList.contains("busy");
       if (!edited) { input.value = text; }
