@@ -143,7 +143,7 @@ every_motor = failed=; for motor in $(basename $(notdir $(wildcard tuning/motors
     $(MAKE) $@ MOTOR=$$motor $(if $(OUT),OUT=$(call quoted,$(OUT))/$$motor) || failed="$$failed $$motor"; done; \
     test -z "$$failed" || { echo "foc33: $@ fails for$$failed" >&2; exit 1; }
 
-.PHONY: sensitivity anymotor bringup run recorder scenarios keys list-motors table2 starts motors robust loadsteps lowspeed catch pulse held setup-run
+.PHONY: sensitivity anymotor bringup run recorder scenarios keys registers list-motors table2 starts motors robust loadsteps lowspeed catch pulse held setup-run
 run: setup-run ## [run] turn the motor on the virtual board: table, plots, trace [SCENARIO=demo MOTOR= BOARD= DEFINES=-D... APP=name USERPARAMS= OUT=folder]
 	@$(if $(scenario)$(what),$(front_end) prepare $(scenario) $(what))
 	@+$(ready)
@@ -158,6 +158,9 @@ scenarios: setup-run ## [run] list the scenarios of make run SCENARIO=name
 
 keys: setup-run ## [run] list the keys of the virtual board: unit, range, meaning
 	@$(front_end) keys
+
+registers: setup-run ## [run] list what the self-test REGISTERS compares: register, bits, value [DEFINES=-D... USERPARAMS=folder]
+	@$(front_end) registers $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(USERPARAMS),--userparams $(call quoted,$(USERPARAMS)))
 
 list-motors: setup-run ## [your motor] the motor files of tuning/motors: data and rating
 	@$(front_end) motors

@@ -85,6 +85,35 @@ def test_the_client_turns_a_motor_of_the_virtual_board(monkeypatch):
     live.close()
 
 
+@pytest.mark.parametrize("arguments, said, shown", [
+    (["run", "1500", "--seconds", "0"], ["speed 1500", "run", "stop"], "stands"), (["speed", "-900"], ["speed -900", "status"], "runs, 1498 rpm, fault NONE"),
+    (["fault"], ["status"], "NONE\n"), (["status"], ["status"], "runs, 1498 rpm"), (["clear"], ["clear"], "runs"), (["stop"], ["stop"], "stands")])
+def test_each_command_of_the_client_says_its_lines(monkeypatch, capsys, arguments, said, shown):
+    spoken = []
+
+    def answer(self, line):
+        spoken.append(line)
+        return text.Status(line != "stop", 0 if line == "stop" else 1498, "NONE")
+    monkeypatch.setattr(text.TextDrive, "command", answer)
+    monkeypatch.setattr(text.lnet, "open_port", lambda port: None)
+    assert text.main(["/dev/null", *arguments]) == 0
+    assert spoken == said and shown in capsys.readouterr().out
+
+
+def test_a_port_that_goes_away_is_told_in_one_line(monkeypatch, capsys):
+    class Gone(Answers):
+        def write(self, data):
+            raise OSError(5, "Input/output error")
+    monkeypatch.setattr(text.lnet, "open_port", lambda port: Gone())
+    assert text.main(["/dev/ttyUSB0", "status"]) == 2
+    assert "the port is gone" in capsys.readouterr().err
+
+
+def test_a_speed_without_a_number_is_refused_in_one_line(capsys):
+    assert text.main(["/dev/null", "speed"]) == 2
+    assert "speed needs a number: speed 1500" in capsys.readouterr().err
+
+
 def test_the_page_shows_the_example_and_lines_with_right_checksums():
     page = (ROOT / "docs" / "application.md").read_text(encoding="utf-8")
     assert (ROOT / "examples" / "my_app.c").read_text(encoding="utf-8") in page
@@ -92,7 +121,7 @@ def test_the_page_shows_the_example_and_lines_with_right_checksums():
     assert len(lines) >= 6 and [line for line in lines if text.content(line) is None] == []
 
 
-@pytest.mark.parametrize("name", ["panel", "fixed_speed", "analog", "fan", "text"])
+@pytest.mark.parametrize("name", ["panel", "fixed_speed", "analog", "fan", "text", "rc"])
 def test_the_page_tells_how_long_each_application_is(name):
     page = (ROOT / "docs" / "application.md").read_text(encoding="utf-8")
     count = len((ROOT / "firmware" / "app" / f"{name}.c").read_text(encoding="utf-8").splitlines())

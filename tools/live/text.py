@@ -1,7 +1,7 @@
 """A client of the application `text`: runs a motor by lines of text, on a real board's port or on the pseudo-terminal of `make live-board APP=text`.
 
-    python3 -m tools.live.text /dev/ttyUSB0 run 1500      # until Ctrl-C, then it stops
-    python3 -m tools.live.text /dev/ttyUSB0 status
+    make text PORT=/dev/ttyUSB0 SAY="run 1500"      # until Ctrl-C, then it stops
+    make text PORT=/dev/ttyUSB0 SAY=status
 """
 
 import argparse
@@ -22,7 +22,7 @@ ANSWER_S = 0.3
 TRIES = 3
 RENEW_S = 0.5
 """How often a running motor hears of its client; without it stops after 2 s (TEXT_SILENT_MS)."""
-COMMANDS = ("run", "stop", "status", "clear")
+COMMANDS = ("run", "speed", "stop", "status", "fault", "clear")
 ANSWER = re.compile(r"(\w+) run ([01]) speed (-?\d+) fault (\w+)")
 REMEDIES = {"range": "choose a speed between MINIMUM_SPEED_RPM and MAXIMUM_SPEED_RPM", "refused": "clear the fault first",
             "unknown": "is its firmware of this version?"}
@@ -94,16 +94,20 @@ def _arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser = command_line.Parser(prog="python3 -m tools.live.text", description=__doc__.splitlines()[0])
     parser.add_argument("port", help="serial port, or the pseudo-terminal that make live-board APP=text names")
     parser.add_argument("command", choices=COMMANDS)
-    parser.add_argument("rpm", nargs="?", type=int, help="speed of run, with its sign the direction")
+    parser.add_argument("rpm", nargs="?", type=int, help="of run and speed, with its sign the direction")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="of run; default: until Ctrl-C")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    if options.command == "speed" and options.rpm is None:
+        parser.error("speed needs a number: speed 1500")
+    return options
 
 
 def _run(options: argparse.Namespace) -> int:
     drive = TextDrive(lnet.open_port(options.port))
     if options.rpm is not None:
         drive.command(f"speed {options.rpm}")
-    print(drive.command(options.command).text(), flush=True)
+    status = drive.command("status" if options.command in ("speed", "fault") else options.command)
+    print(status.fault if options.command == "fault" else status.text(), flush=True)
     if options.command == "run":
         try:
             for status in drive.run(options.seconds):
@@ -116,9 +120,16 @@ def _run(options: argparse.Namespace) -> int:
     return 0
 
 
+def _to_its_end(options: argparse.Namespace) -> int:
+    try:
+        return _run(options)
+    except OSError as error: # a plug that was pulled; pyserial's errors are such, too
+        raise UserError(f"the port is gone ({error})", options.port, "is the plug in, does make live-board still run?") from None
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the command; returns the exit code."""
-    return command_line.run(lambda: _run(_arguments(arguments)))
+    return command_line.run(lambda: _to_its_end(_arguments(arguments)))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # The virtual board in real time: make live, the page; make live-board, its serial line. Variables: MOTOR BOARD DEFINES USERPARAMS as for
 # `make run`; LOOP SPEED LOAD OUT (make response); PORT ELF (a real board); CPU=33f (the simulated chip, with XC16=folder or IMAGE=file).
 tuned = $(if $(USERPARAMS),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,:))
-.PHONY: live response live-pictures live-board live-library live-params setup-live setup-scope
+.PHONY: live response live-pictures live-board text live-library live-params setup-live setup-scope
 live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= PORT=/dev/ttyUSB0 ELF= KEPT=file]
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
@@ -36,6 +36,9 @@ live-board: setup-scope ## [run] the virtual board in real time, its serial line
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live.board $(if $(CPU),--cpu $(CPU)) $(if $(IMAGE),--image $(call quoted,$(IMAGE))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) \
 	    $(if $(APP),--app $(call quoted,$(APP))) $(if $(KEPT),--kept $(call quoted,$(KEPT))) $(what)
+
+text: setup-scope ## [your board] run, speed, stop, status, fault, clear by lines of text, of a board with APP=text [PORT=/dev/ttyUSB0 SAY="run 1500"]
+	@$(if $(and $(PORT),$(SAY)),$(alone) $(python) -m tools.live.text $(call quoted,$(PORT)) $(SAY),echo 'foc33: make text needs PORT= and SAY=: as in make text PORT=/dev/ttyUSB0 SAY="run 1500"' >&2; exit 2)
 
 setup-scope:
 	@tools/setup/prepare.sh scope
