@@ -60,6 +60,9 @@ HOLDS = {
     "hand-over within two seconds if nothing is said": (S2 + expect("hand_over"), CLOSED),
     "overshoot a second after the hand-over": (OVERSHOOT, CLOSED | {"plant__speed_rpm": step((0, 1000), (1.9, 1120))}),
     "stop in time and slow enough": (SLOW_STOP, off_from(1.4) | {"plant__speed_rpm": step((0, 1000), (1.3, 400))}),
+    "stop that ends in a short circuit of the winding": (SLOW_STOP, {
+        "pwm__outputs_on": step((0, 21), (1.05, 0), (1.0501, 42), (1.3, 0)), "pwm__outputs_seen": step((0, 63), (1.3, 0)),
+        "fw__state": step((0, 5), (1.05, 9), (1.3, 1)), "plant__speed_rpm": step((0, 1000), (1.3, 0))}),
     "stop that counts to its end": (AGAIN, {name: step((0, on), (0.7, 0), (1.1, on))
                                            for name, on in (("pwm__outputs_on", 21), ("pwm__outputs_seen", 63))}),
     "stop with the allowed speed and current": (GENTLE_STOP + "lowest_rpm = -3\n", BACKWARDS[1] | {"plant__i_q": -0.5}),
@@ -179,3 +182,12 @@ def test_a_text_is_looked_for_in_what_the_serial_line_has_sent(sent, never, ok):
     done = run(expect("sent", text="ok run", never=never))
     done.sent = sent
     assert [outcome.ok for outcome in report.check(done)] == [ok]
+
+
+def test_a_stop_that_coasts_may_be_fast_when_the_outputs_go_off():
+    fast = run(SLOW_STOP, **off_from(1.1), plant__speed_rpm=step((0, 1000), (1.9, 0)))
+    named = {outcome.row: outcome.ok for expectation in fast.scenario.expectations for outcome in expectation.check(fast)}
+    assert not named["stop: speed when the outputs go off"]
+    fast.params["STOP_MODE"] = 1.0
+    rows = {outcome.row: outcome.ok for expectation in fast.scenario.expectations for outcome in expectation.check(fast)}
+    assert "stop: speed when the outputs go off" not in rows and all(rows.values())

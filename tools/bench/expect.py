@@ -162,6 +162,16 @@ class HandOverExpectation(Expectation):
         return outcomes
 
 
+RAMPS, COASTS = 0.0, 1.0
+"""STOP_MODE: as a rule, and without a ramp: the outputs go off at any speed."""
+
+
+def _braked_rows(run: Run, trace: Trace) -> int:
+    """Rows until a short circuit of the winding that a stop begins (STOP_MODE 2) is over; 0 without one."""
+    braked = np.flatnonzero(trace.column("fw.state") == run.state_number("BRAKE"))
+    return int(braked[-1]) + 1 if len(braked) else 0
+
+
 def _off_row(trace: Trace, from_row: int = 0) -> int | None:
     """First row from `from_row` on with all six outputs off."""
     off = np.flatnonzero(trace.column("pwm.outputs_on")[from_row:] == 0)
@@ -195,7 +205,7 @@ class StopExpectation(Expectation):
 
     def check(self, run: Run) -> list[Outcome]:
         part = run.trace.part(self.after_s, self.to_s)
-        row = _off_row(part)
+        row, mode = _off_row(part, _braked_rows(run, part)), run.params.get("STOP_MODE", RAMPS)
         allowed = f"at most {self.within_s:g} s after {self.after_s:g} s, and to " + \
             ("the end" if self.to_s >= run.scenario.duration_s else f"{self.to_s:g} s")
         if row is None:
@@ -204,7 +214,7 @@ class StopExpectation(Expectation):
         stays = _stays_off(run, part, row)
         got = f"{took:.3f} s" + ("" if stays else ", on again later")
         outcomes = [Outcome("stop: outputs off", took <= self.within_s and stays, got, allowed)]
-        if self.speed_max_rpm is not None:
+        if self.speed_max_rpm is not None and mode != COASTS:
             speed = abs(float(part.column("plant.speed_rpm")[row]))
             outcomes.append(Outcome("stop: speed when the outputs go off", speed <= self.speed_max_rpm, f"{speed:.0f} rpm",
                                     f"at most {self.speed_max_rpm:g} rpm"))
