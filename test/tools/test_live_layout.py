@@ -327,6 +327,9 @@ def test_the_page_says_no_answer_and_what_is_old_is_grey(chromium):
         assert text.startswith("no answer") # a warning is for a while
         assert inside(page, "link.hush(false); " + frame % "true" + told)[1:] == [False, text] # after a new connection, too
         assert inside(page, frame % "false" + told) == [False, True, ""]
+        old = "views.strips.graphs[0].graph.xAxisRange()[1]"
+        last = inside(page, "views.strips.rows.at(-1)[0]")
+        assert inside(page, f"views.strips.count = 0; views.strips.show({{ ...foc33.frame, t: {last} + 60, strip: [], silent: true }}); {old}") == max(last, 10)
         page.state("STOPPED")
         short.end()
         page.wait("return " + grey, "the values of a board that has ended stay", 5.0)

@@ -54,7 +54,7 @@ class StripsView {
   show(frame) {
     this.add(frame.strip);
     if (this.count++ % 2 || !this.rows.length) { return; } // ten pictures a second are enough
-    const seconds = Math.max(0.05, Math.min(10, 10 * frame.pace)), to = Math.max(frame.t, seconds);
+    const seconds = Math.max(0.05, Math.min(10, 10 * frame.pace)), to = Math.max(frame.silent ? this.rows.at(-1)[0] : frame.t, seconds); // of a silent board what came last stays
     const window_ = [to - seconds, to], shown = this.rows.filter((row) => row[0] >= window_[0] - seconds / 100);
     for (const { graph, values, column, panel } of this.graphs) {
       const lines = shown.map((row) => [row[0], ...row.slice(column, column + panel.lines.length)]);
