@@ -106,7 +106,7 @@ MISTAKES = {
        for name, text in (("LOOPTIME_SEC", "(1/20000)"), ("MOTOR_RS_OHM", "5/2"), ("MOTOR_RS_OHM", "(5 / 2)"), ("KCURRA", "-1/2"),
                           ("OVER_CURRENT_THRESHOLD_A", "38/10"), ("SNAPDELAY", "11/2"))},
     **{f"a division by 0, {text}": (value("MOTOR_RS_OHM", text), "MOTOR_RS_OHM",
-                                    f"MOTOR_RS_OHM = {text} divides by 0: write a number, {range_of('MOTOR_RS_OHM')}") for text in ("1/0", "(2/0)")},
+                                    f"MOTOR_RS_OHM = {text} divides by 0: write a number, {range_of('MOTOR_RS_OHM')}") for text in ("1/0", "(2/0)", "1/0.0", "1.0/0.0f")},
     **{f"octal {text}": (value("MAXIMUM_SPEED_RPM", text), "MAXIMUM_SPEED_RPM",
                          f"MAXIMUM_SPEED_RPM = {text} is octal to C, for it begins with 0: write it without, {range_of('MAXIMUM_SPEED_RPM')}")
        for text in ("05500", "(05500)", "05500 + 1", "09")},

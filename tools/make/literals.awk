@@ -42,7 +42,7 @@ BEGIN {
     floating = pointed(text)
     if (octal != "")
         refuse("octal", "1", name " = " text " has an octal number, " octal ": write it without the 0 in front")
-    else if (text ~ /\// && floating != text && text !~ /[%&|^~<>?!"']/ && text !~ /\/[ \t(]*0+[ \t)]*$/ && text !~ /NORM_/) # what has a quotient, no division by 0 (param_check.c tells of it), and operators that a float has
+    else if (text ~ /\// && floating != text && text !~ /[%&|^~<>?!"']/ && text !~ /\/[ \t(]*0+(\.0*)?[fF]?[ \t)]*$/ && text !~ /NORM_/) # what has a quotient, no division by 0 (param_check.c tells of it), and operators that a float has
         refuse("fraction", "__builtin_fabsf((float)(" text ") - (float)(" floating ")) > 0.00001F * __builtin_fabsf((float)(" floating "))", \
                name " = " text " divides whole numbers, of which C drops the fraction: write " floating)
 }
