@@ -42,6 +42,25 @@ void test_a_stopped_drive_stays_off_and_shows_neither_speed_nor_reference(void)
     }
 }
 
+/* ---- what a flipped bit leaves ---- */
+
+void test_a_flipped_bit_in_the_d_current_of_a_hand_over_that_is_over_does_not_stay(void)
+{
+    rig_closed(1, 8000);
+    drive.run.handover.id_q13 = 0x4000;
+    rig_tick(32);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
+    TEST_ASSERT_TRUE(qm_abs(drive.run.control.ref_q13.d) < 100);
+}
+
+void test_a_flipped_bit_in_the_sample_s_shift_does_not_stay_while_the_rotor_is_aligned(void)
+{
+    rig_lock(1);
+    drive.run.control.sample_shift_q13 = 0x1000;
+    rig_tick(8);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.sample_shift_q13);
+}
+
 /* ---- the slow work: a part every second period, speed and bus every eighth, limits and rates every sixteenth, the others every 32nd ---- */
 
 void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_thirty_two(void)
