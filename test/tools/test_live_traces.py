@@ -370,6 +370,24 @@ def test_a_channel_that_is_cleared_is_left_out_and_the_others_stay(page):
     assert page.run("return document.activeElement === arguments[0]", inputs[0])
 
 
+def test_a_name_that_no_variable_has_is_said_in_words_and_not_by_colour_alone(page):
+    inputs = page.driver.find_elements("css selector", "#scope-channels input")
+    inputs[0].send_keys(ALL + "nonsense\n")
+    page.wait("return document.getElementById('message').textContent.includes('nonsense')", "nothing is said")
+    assert message(page) == "channel 1: no variable 'nonsense': choose one of the list, or clear it"
+    assert inputs[0].get_attribute("aria-invalid") == "true" and inputs[1].get_attribute("aria-invalid") == "false"
+
+
+def test_the_button_of_the_fault_recorder_once_more_brings_the_channels_of_before_back(page):
+    before = inside(page, "views.scope.setup")
+    page.click("#scope-fault")
+    page.wait("return document.getElementById('scope-fault').getAttribute('aria-pressed') === 'true'", "not armed")
+    assert inside(page, "views.scope.setup.channels") != before["channels"]
+    page.click("#scope-fault")
+    page.wait("return document.getElementById('scope-fault').getAttribute('aria-pressed') === 'false'", "still armed")
+    assert inside(page, "views.scope.setup") == before
+
+
 def test_the_record_of_a_fault_comes_by_itself_with_cause_and_remedy_beside_it(page):
     page.click("[data-button=S2]")
     page.state("CLOSED")

@@ -33,13 +33,19 @@ class ScopeView extends TracesView {
       input.style.borderLeftColor = `var(--${color})`;
       input.addEventListener("focus", () => { if (input.value) { input.dataset.before = input.value; } });
       input.addEventListener("change", () => {
-        input.classList.toggle("wrong", Boolean(input.value) && !this.whole(input.value));
-        if (input.classList.contains("wrong")) { return; }
+        const wrong = Boolean(input.value) && !this.whole(input.value);
+        this.mark(input, wrong);
+        if (wrong) { warn(`channel ${n + 1}: no variable '${input.value}': choose one of the list, or clear it`); return; }
         this.apply({ channels: this.chosen() });
         if (!input.value) { this.inputs.forEach((item, at) => { item.value = this.short(this.setup.channels[at] ?? ""); }); } // those behind it move up, here as in the trace
       });
       return input;
     });
+  }
+
+  mark(input, wrong) {
+    input.classList.toggle("wrong", wrong);
+    input.setAttribute("aria-invalid", String(wrong));
   }
 
   chosen() { return this.inputs.map((input) => this.whole(input.value)).filter((name) => name); }
@@ -52,7 +58,11 @@ class ScopeView extends TracesView {
     listen("scope-level", (item) => ({ level: Number(item.value) || 0 }));
     listen("scope-position", (item) => ({ position: Number(item.value) / 100 }));
     listen("scope-factor", (item) => ({ factor: Number(item.value) }));
-    by("scope-fault").onclick = () => this.apply(this.recorder);
+    by("scope-fault").onclick = () => { // once more: back to what was looked at before
+      const armed = this.isArmed(), own = this.setup.channels.join() !== this.recorder.channels.join();
+      if (own) { this.before = { ...this.setup }; }
+      this.apply(armed && this.before ? this.before : this.recorder);
+    };
     by("scope-edge").onclick = () => this.apply({ rising: !this.setup.rising });
   }
 
@@ -72,7 +82,7 @@ class ScopeView extends TracesView {
     this.setup = setup;
     this.inputs.forEach((input, n) => {
       const name = setup.channels[n];
-      if (document.activeElement !== input) { input.value = name ? this.short(name) : ""; input.classList.remove("wrong"); }
+      if (document.activeElement !== input) { input.value = name ? this.short(name) : ""; this.mark(input, false); }
     });
     const triggers = [...new Set([...setup.channels, ...(setup.trigger ? [setup.trigger] : [])])];
     by("scope-trigger").replaceChildren(new Option("none", ""), ...triggers.map((name) => new Option(this.short(name), name)));
@@ -84,12 +94,14 @@ class ScopeView extends TracesView {
     by("scope-factor").value = setup.factor;
     for (const item of ["scope-edge", "scope-level", "scope-position"]) { by(item).disabled = !setup.trigger; }
     for (const button of document.querySelectorAll("#scope-mode button")) { button.setAttribute("aria-pressed", String(button.dataset.mode === setup.mode)); }
-    const armed = ["mode", "trigger", "level"].every((key) => setup[key] === this.recorder[key]);
+    const armed = this.isArmed();
     by("scope-fault").setAttribute("aria-pressed", String(armed));
     if (armed) { this.expect(setup.channels, setup.channels.map((name) => this.units[name])); }
     this.why();
     this.say({ waits: this.waits(), stop: "stopped", lent: "suspended while a loop is measured" }[status] ?? status, !["waits", "stop", "lent"].includes(status));
   }
+
+  isArmed() { return ["mode", "trigger", "level"].every((key) => this.setup[key] === this.recorder[key]); }
 
   waits() { return this.setup.trigger ? "waits for its trigger" : "records"; }
 
