@@ -97,6 +97,16 @@ void test_limits_of_the_upper_word_keep_the_lower_one_within(void)
     }
 }
 
+void test_a_sum_ends_at_its_limits(void)
+{
+    static const int32_t cases[][2] = { { 5, 5 }, { 6, 5 }, { INT32_MAX, 5 }, { -3, -3 }, { -4, -3 }, { INT32_MIN, -3 }, { 0, 0 } };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][1], qm_within(cases[n][0], -3, 5), golden_row(n));
+    }
+    TEST_ASSERT_EQUAL_INT16(INT16_MIN, qm_within(-40000, INT16_MIN, INT16_MAX));
+    TEST_ASSERT_EQUAL_INT16(INT16_MAX, qm_within(40000, INT16_MIN, INT16_MAX));
+}
+
 /* ---- ranges and magnitudes ---- */
 
 /** Numbers around each bound of -most..most and the ends of the format. */
