@@ -61,7 +61,7 @@ SOURCES = {
     **{name: Source(tuple(f"{name} MOTOR={motor}" for motor in MOTORS)) for name in ("loadsteps", "lowspeed", "catch")},
     **{name: Source(tuple(f"{name} MOTOR={motor}" for motor in MOTORS), counts=True) for name in ("held", "pulse")},
     "response": Source(tuple(f"response MOTOR={motor}" for motor in MOTORS), pictures=(("run/response/speed.png", "response-speed.png"),)),
-    "box": Source(tuple(f"starts MOTOR={motor}{draw}" for motor in MOTORS for draw in (" FULL=1", " DRAW=300 SEED=1")), counts=True),
+    "box": Source(tuple(f"starts MOTOR={motor}{draw}" for motor in MOTORS for draw in (" FULL=1", " DRAW=300 SEED=1"))),
     "demo_40khz": Source((f"run SCENARIO=demo_40khz {AT_40KHZ} OUT=build/run/demo_40khz",)),
     "table2_40khz": Source((f"table2 {AT_40KHZ} OUT=build/run/table2_40khz",)),
     "cycles_40khz": Source((f"tune {AT_40KHZ}", f"cycles SCENARIO=demo_40khz USERPARAMS={HEADER_40KHZ} OUT=build/target/40khz"), "chip"),
