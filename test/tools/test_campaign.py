@@ -4,6 +4,7 @@ import csv
 import functools
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -136,6 +137,14 @@ def test_a_speed_that_a_load_swings_is_judged_over_a_turn():
         assert verdict(replace(LIMITS, mean_s=0.1), plant__speed_rpm=ends).outcome == judge.RIDDEN
     late = replace(LIMITS, mean_s=0.1, settled_s=1.99)
     assert verdict(late, plant__speed_rpm=after(1.93, 900.0, 1000.0)).outcome == judge.SILENT # what comes last counts
+
+
+def test_the_mean_of_a_row_is_that_around_it_and_of_the_last_rows_the_last_whole_ones():
+    ramp = running(plant__speed_rpm=lambda time_s: 1000.0 * time_s)
+    means = judge._smooth(ramp, "plant.speed_rpm", replace(LIMITS, mean_s=0.1))
+    inside = (ramp.time_s > 0.06) & (ramp.time_s < 1.94)
+    assert means[inside] == pytest.approx(1000.0 * ramp.time_s[inside], abs=1.0)
+    assert means[0] == pytest.approx(50.0, abs=1.0) and means[-1] == pytest.approx(1950.0, abs=1.0)
 
 
 def test_a_load_that_pulses_swings_the_slowest_speed_that_follows_by_its_share(bench):
@@ -279,6 +288,8 @@ def test_what_cannot_be_known_is_a_wrong_clock_and_a_ripple_as_dead_time_makes_i
              "power stage: transistor never turns on")
     assert unseen == dict.fromkeys(kinds, judge.Unseen(more_rpm=0.5 * np.pi * rating.dead_rpm)) | {"clock: crystal off frequency": judge.Unseen(clock=1.2)}
     lost = injection.BY_NAME["interrupts: some lost"]
+    seen = re.search(r"LEAST_TICKS PARAM_PERIODS\(([\d.]+)F\)", (paths.ROOT / "firmware/board/firmware.c").read_text(encoding="utf-8"))[1]
+    assert injection.LOST_UNSEEN == pytest.approx(1.0 - float(seen) / 0.1)
     assert [lost.unseen(size, rating).clock for size in (0.02, 0.03, 0.031, 0.5)] == pytest.approx([0.98, 0.97, 1.0, 1.0])
     assert param_rows.number("PARAM_RS_MOST") == pytest.approx(injection.MOST_RESISTANCE - 1.0)
     gain = injection.BY_NAME["sensors: current gain"]

@@ -88,6 +88,8 @@ def test_a_drawn_hold_is_a_brake_twice_with_another_motor():
     assert [at_s for at_s, _ in brakes] == pytest.approx([0.0, 0.1, 0.3, 0.4]) and [nm for _, nm in brakes] == [0.3, 0.04, 0.3, 0.04]
     assert not [action for action in job.actions if "load.locked" in action.keys]
     assert job.values["motor.rs_ohm"] == pytest.approx(1.2 * motor.rs_ohm) and ITEM.until_s == 0.1
+    plain = bench.job(ITEM).values
+    assert job.values["motor.psi_vs"] == pytest.approx(0.9 * plain["motor.psi_vs"]) and job.values["motor.ld_h"] == plain["motor.ld_h"]
     assert job.scenario.duration_s == pytest.approx(held_s + 0.4 + bench.allowed_s(ITEM) + held_sweep.WATCH_S)
 
 

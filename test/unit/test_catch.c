@@ -91,6 +91,21 @@ void test_speed_follows_from_turn_and_time_in_its_format(void)
     }
 }
 
+void test_a_flux_beyond_its_format_keeps_its_direction(void)
+{
+    rig_ready();
+    drive.run.model.rs_q16 = 65535u;
+    EACH_DIRECTION(sign) {
+        const alphabeta_t large_q11 = { (int16_t)(sign * 30000), (int16_t)(sign * 30000) };
+        drive.run.catching.phase = (uint16_t)CATCH_FIRST_LOOK;
+        drive.run.catching.sum_q11 = large_q11;
+        drive.phases_q13.a = (int16_t)(sign * 3000);
+        drive.periods = 1;
+        TEST_ASSERT_TRUE(catch_look(&drive, &params));
+        TEST_ASSERT_INT16_WITHIN(200, (sign > 0) ? -24576 : 8192, (int16_t)drive.run.catching.direction); /* -135, 45 degrees */
+    }
+}
+
 /* ---- what follows ---- */
 
 void test_the_pause_between_two_looks_falls_with_the_rotor_s_speed_between_its_ends(void)
