@@ -189,7 +189,7 @@ static void limits(void)
     FIELD(stall_steps, PARAM_STALL_SEC, "s", 2.0 * slots, "16 periods", "stall");
     FIELD(lost_lock_steps, 0.06, "s", 2.0 * slots, "16 periods", "lost lock");
     FIELD(wrong_steps, 0.1, "s", slots, "8 periods", "voltages and currents do not fit the motor");
-    FIELD(load_erpm, at_most(PARAM_KT / MOTOR_INERTIA_KGM2 * MAXIMUM_CURRENT_A / (4.0 * PARAM_PI * PARAM_PI * PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ)
+    FIELD(load_erpm, at_most(PARAM_KT / MOTOR_INERTIA_KGM2 * MAXIMUM_CURRENT_A * PARAM_LOAD_MEAN / (2.0 * PARAM_PI * PARAM_LOADED_SHARE * LOAD_BANDWIDTH_HZ)
                              * 60.0 / (2.0 * PARAM_PI), 32767.0 * erpm), "rpm", erpm, "erpm", "mean innovation that no load makes");
     FIELD(impossible_steps, 0.25, "s", SLOW_ROUND_STEPS * slots, "32 periods", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");

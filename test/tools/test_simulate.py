@@ -14,6 +14,7 @@ import pytest
 from support import FAULTS, LIBRARY, SCENARIO, STATES, refusal, scenario
 
 from tools.bench import command_common, long_run, simulate
+from tools.bench import scenario as scenario_module
 from tools.common import board_file, motor_file, paths, workers
 from tools.common.errors import UserError
 from tools.bench.panel import Ranges, plan
@@ -131,6 +132,16 @@ def test_a_long_run_names_what_takes_most_of_it_and_the_key_to_change(values, sa
     assert said in told and (" waits " not in told or told.endswith("test.toml"))
     sweeps_own = long_run.reason(replace(item, events=[replace(event, where="tables/x.toml") for event in item.events], duration_s=9000.0), params)
     assert sweeps_own.endswith("its own waits and stretches: change the times of tables/x.toml")
+
+
+def test_a_slow_speed_loop_has_as_much_more_time_after_a_load_s_step_as_after_a_change_of_speed():
+    params = {"SPEEDREFRAMP_RPM_PER_S": 3000.0, "SPEED_BANDWIDTH_HZ": 10.0, "LOAD_BANDWIDTH_HZ": 1.0, "END_SPEED_RPM": 1000.0, "LOCK_TIME": 4000.0,
+              "LOOPTIME_SEC": 50e-6, "NOPOLESPAIRS": 5.0, "OPENLOOP_RAMPSPEED_INCREASERATE": 1000.0}
+    start = '[[event]]\nat_s = 0.0\nspeed_rpm = 2000\n[[event]]\nat_s = 0.1\npress = "S2"\n'
+    changes = {what: scenario(f"{start}[[event]]\nat_s = 1.9\n{what}\n") for what in ("speed_rpm = 2000", "set = { load.constant_nm = 0.01 }")}
+    for what, item in changes.items():
+        quick, slow = (scenario_module.stretched(item, params | {"SPEED_BANDWIDTH_HZ": hz}).duration_s for hz in (10.0, 0.5))
+        assert slow - quick == pytest.approx(2.0 * (scenario_module.SETTLE_PERIODS / 0.5 - scenario_module.SETTLE_S)), what
 
 
 def test_a_long_run_says_so_before_it_begins_and_its_whole_report_takes_little_memory(tmp_path):

@@ -154,6 +154,8 @@ def _delays(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: fl
             yield event.at_s, max(now / down - RAMP_S, now * coasting - RAMP_S, 0.0) + 2.0 * settle_s(now)
         elif event.kind == "set" and BRAKE in event.keys:
             coasting = 0.0 if event.keys[BRAKE] else coast_s_per_rpm
+            if presses and event.at_s > presses[0]:
+                yield event.at_s, settle_s(now)
 
 
 def _event_in_numbers(event: Event, rating: Rating | None, params: dict[str, float], least_rpm: float) -> Event:
