@@ -12,7 +12,7 @@ from tools.common.param_rows import FOLLOWS, number, parameters
 
 from . import constants, design_warnings, fw_tables, limits, loops, remedies, start
 from .constants import number_of
-from .design_result import Design, maximum_speed, plain, range_of, real, short, spread_of
+from .design_result import Design, maximum_speed, plain, range_of, real, short, spread_of, with_bridge
 from .limits import RPM, Envelope
 
 ESDQ_HZ = 200.49
@@ -48,8 +48,9 @@ ACCEL_MOST, ACCEL_LEAST = number("PARAM_ACCEL_MOST"), number("PARAM_ACCEL_LEAST"
 def design(motor: Motor, board: BoardFile) -> Design:
     """Everything. Refuses by UserError what cannot work; what works with a cost is in `.warnings`."""
     problems = Problems()
+    motor, bridge_ohm = with_bridge(motor, board)
     currents = limits.fit_emf(motor, board, limits.currents(motor, board))
-    d = Design(motor, board, Envelope(motor, limits.circle_v(board), currents.maximum_a))
+    d = Design(motor, board, Envelope(motor, limits.circle_v(board), currents.maximum_a), bridge_ohm=bridge_ohm)
     _motor(d)
     _board(d)
     _refuse_impossible(d, currents, problems)
@@ -175,7 +176,9 @@ def _range_remedy(d: Design, name: str) -> str:
 def _motor(d: Design) -> None:
     m = d.motor
     d.put("NOPOLESPAIRS", str(m.pole_pairs), "motor file")
-    d.put("MOTOR_RS_OHM", plain(m.rs_ohm), "motor file; per phase of the star")
+    d.put("MOTOR_RS_OHM", plain(m.rs_ohm - d.bridge_ohm), "motor file; per phase of the star")
+    if d.bridge_ohm:
+        d.put("BRIDGE_RS_OHM", plain(d.bridge_ohm), "board file: a transistor and half of the shunt, where they are more than a tenth of the winding")
     d.put("MOTOR_LS_MH", plain(m.lq_h * 1e3), "motor file; per phase of the star" + (
         ", of the q axis: with Lq in Equation 4 the salient motor's back-EMF lies on the q axis whatever the current, with Ld or a mean "
         "its angle would turn with the torque" if m.salient else ""))

@@ -54,6 +54,8 @@ class Design:
     motor: Motor
     board: BoardFile
     envelope: Envelope
+    bridge_ohm: float = 0.0
+    """of BRIDGE_RS_OHM, in the motor's R"""
     choices: dict[str, Choice] = field(default_factory=dict)
     constants: list[Constant] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -157,6 +159,19 @@ def range_of(name: str) -> tuple[float, float]:
     """Smallest and largest value of a parameter."""
     row = parameters()[name]
     return float(row.low), float(row.high)
+
+
+BRIDGE_COUNTS = 0.1
+"""Less than this share of the winding is within what R may be off."""
+
+
+def with_bridge(motor: Motor, board: BoardFile) -> tuple[Motor, float]:
+    """The motor as the drive meets it, with the bridge's resistance in its own where that counts, and that resistance."""
+    bridge_ohm = board.rds_on_ohm + 0.5 * board.shunt_ohm
+    if bridge_ohm <= BRIDGE_COUNTS * motor.rs_ohm:
+        return motor, 0.0
+    spread = {key: tuple(ohm + bridge_ohm for ohm in ends) if key == "rs_ohm" else ends for key, ends in motor.spread.items()}
+    return replace(motor, rs_ohm=motor.rs_ohm + bridge_ohm, spread=spread), bridge_ohm
 
 
 def spread_of(motor: Motor) -> dict[str, tuple[float, float]]:

@@ -4,11 +4,12 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from tools.common.board_file import TABLES
 from tools.common.motor_file import Motor
 
 from . import limits, load_onset, remedies, start
 from .design_result import Design
-from .limits import Envelope
+from .limits import RPM, Envelope
 from .remedies import either
 
 ROUNDING_LIMIT_PERCENT = 0.1
@@ -124,7 +125,7 @@ def _rated_current(d: Design, currents: limits.Currents) -> list[str]:
 
 # ---- speeds ------------------------------------------------------------------------------------------------------------------
 def _speeds(d: Design) -> list[str]:
-    return [*_rated_torque(d), *_top_speed(d), *_nominal_speed(d), *_inductance(d)]
+    return [*(_rated_torque(d) or _soft_supply(d)), *_top_speed(d), *_nominal_speed(d), *_inductance(d)]
 
 
 def _rated_torque(d: Design) -> list[str]:
@@ -136,6 +137,29 @@ def _rated_torque(d: Design) -> list[str]:
     return [warning(f"{volt:g} V are too low for the rated torque at rated speed: about {torque:.2g} N m of {m.rated_torque_nm:.2g} N m at {m.rated_speed_rpm:g} rpm",
                     "raise the supply voltage" if enough else "",
                     remedies.lower_rated_speed(max(e.highest_speed(m.rated_torque_nm, limits.FULL_SHARE), 1.0), m))]
+
+
+def _soft_supply(d: Design) -> list[str]:
+    """Half the rated torque at rated speed, for which the supply's resistance may leave too little voltage."""
+    m, e, volt, ohm = d.motor, d.envelope, d.board.nominal_bus_v, d.board.quantities["supply.resistance"].value_si
+    half = 0.5 * m.rated_torque_nm
+
+    def bus_v(rpm: float, supply_ohm: float) -> float:
+        """V (U - V) / R is what winding, bridge, friction and load take."""
+        i_q = e.iq(rpm, half)
+        watt = 1.5 * m.rs_ohm * i_q ** 2 + m.kt_nm_per_a * i_q * rpm * RPM
+        return 0.5 * (volt + math.sqrt(max(volt ** 2 - 4.0 * supply_ohm * watt, 0.0)))
+
+    def holds(rpm: float, supply_ohm: float) -> bool:
+        left = replace(e, circle_v=e.circle_v * bus_v(rpm, supply_ohm) / volt)
+        return left.least_id(rpm, half, limits.FULL_SHARE) is not None
+    if holds(m.rated_speed_rpm, ohm):
+        return []
+    slower = limits.halved(lambda rpm: holds(rpm, ohm), 1.0, m.rated_speed_rpm, 24)
+    enough = limits.digits_down(limits.halved(lambda less: holds(m.rated_speed_rpm, less), 0.0, ohm, 24), 2)
+    least = TABLES["supply"]["resistance"].kind.minimum
+    return [warning(f"{ohm:g} ohm of the supply leave {bus_v(m.rated_speed_rpm, ohm):.3g} V of {volt:g} V with half the rated torque at rated speed, which is not enough",
+                    f"lower [supply] resistance to {enough:g} ohm in the board file" if enough >= least else "", remedies.lower_rated_speed(slower, m))]
 
 
 def _top_speed(d: Design) -> list[str]:

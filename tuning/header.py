@@ -29,6 +29,8 @@ def write(design: Design) -> str:
         lines += ["", _rule(title + facts.get(re.split("[:,]", title)[0], ""))]
         for stem, group in itertools.groupby(rows, lambda row: row.stem):
             lines += _entries(design, list(group)) if stem else [_define(design, row, facts) for row in group]
+        if title.startswith("Motor") and "BRIDGE_RS_OHM" in design.choices:
+            lines.append(f"{_left('BRIDGE_RS_OHM', design)}/* [ohm] a transistor and half of the shunt: beside MOTOR_RS_OHM they count */")
         if title.startswith("Control loops") and "D_CURRCNTR_PTERM" in design.choices:
             lines += [f"{_left('D_CURRCNTR_PTERM', design)}/* [V/A, Q15/16] 2 pi f Ld: the salient motor's d axis has its own inductance */",
                       f"{_left('Q_CURRCNTR_PTERM', design)}/* [V/A, Q15/16] 2 pi f Lq */"]

@@ -36,7 +36,7 @@ static double filter_hz(double k_q15)
 
 static void motor(void)
 {
-    double rs = MOTOR_RS_OHM, ls = MOTOR_LS_MH, kphi = MOTOR_KPHI_V_PER_KRPM, one_ls = ohm * period * 1000.0;
+    double rs = MOTOR_RS_OHM + BRIDGE_RS_OHM, ls = MOTOR_LS_MH, kphi = MOTOR_KPHI_V_PER_KRPM, one_ls = ohm * period * 1000.0;
     GROUP("motor");
     MACRO(NORM_RS, rs, "ohm", rs / at_most(rs / ohm * 16384.0, 32767.0), "Q15 / 2", "Equation 5, AN1292's constant, at most 32767");
     MACRO(NORM_LSDTBASE, ls, "mH", ls / at_most(ls / one_ls * 128.0, 32767.0), "Q15 / 256", "Equation 5, AN1292's constant, at most 32767");
@@ -166,7 +166,7 @@ static void limits(void)
 {
     double bus = BUS_FULL_SCALE_V / 32768.0, most = MAXIMUM_CURRENT_A;
     GROUP("limits");
-    MACRO(PARAM_BRAKE_COUNTS, at_most(most * MOTOR_RS_OHM * PARAM_ERPM_PER_V / pairs, 32767.0 * erpm), "rpm", erpm, "erpm", "the short-circuited winding takes no more current below");
+    MACRO(PARAM_BRAKE_COUNTS, at_most(most * (MOTOR_RS_OHM + BRIDGE_RS_OHM) * PARAM_ERPM_PER_V / pairs, 32767.0 * erpm), "rpm", erpm, "erpm", "the short-circuited winding takes no more current below");
     FIELD(current_max_q13, most, "A", q13_a, "Q13 A", "current vector that is asked for");
 #if MOTOR_SALIENCY_UH
     FIELD(salience_q13, MOTOR_KPHI_V_PER_KRPM / sqrt(3.0) * 60.0 / (2.0 * PI * 1000.0 * pairs) / (MOTOR_SALIENCY_UH * 1e-6), "A", q13_a, "Q13 A",

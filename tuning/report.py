@@ -27,7 +27,8 @@ def text(design: Design) -> str:
     d, m, s = design, design.motor, design.start_up
     value = d.value
     ls = f"{m.lq_h * 1e3:.4g} mH" if not m.salient else f"Ld {m.ld_h * 1e3:.4g} mH, Lq {m.lq_h * 1e3:.4g} mH"
-    rows = [("motor", f"{m.rs_ohm:.4g} ohm, {ls} (phase of the star), {m.pole_pairs} pole pairs, {value('MOTOR_INERTIA_KGM2'):.3g} kg m2"),
+    bridge = f" and {d.bridge_ohm:.2g} ohm of the bridge" if d.bridge_ohm else ""
+    rows = [("motor", f"{m.rs_ohm - d.bridge_ohm:.4g} ohm{bridge}, {ls} (phase of the star), {m.pole_pairs} pole pairs, {value('MOTOR_INERTIA_KGM2'):.3g} kg m2"),
             ("Kphi", units.kphi_forms(m.kphi_v_per_krpm, m.pole_pairs)),
             ("rated", f"{m.rated_torque_nm:.3g} N m at {m.rated_speed_rpm:g} rpm and {m.rated_current_a:.3g} A peak ({d.board.title})"),
             ("speeds", f"{value('MINIMUM_SPEED_RPM'):g} .. {value('NOMINAL_SPEED_RPM'):g} rpm, up to {value('MAXIMUM_SPEED_RPM'):g} rpm with S3"),

@@ -149,6 +149,7 @@
 
 /** X(name): what userparams.h may define, too; otherwise drive/param_scaling.h computes it. */
 #define PARAM_OPTIONAL(X) \
+    X(BRIDGE_RS_OHM) \
     X(D_CURRCNTR_PTERM) X(D_CURRCNTR_ITERM) X(D_CURRCNTR_CTERM) \
     X(Q_CURRCNTR_PTERM) X(Q_CURRCNTR_ITERM) X(Q_CURRCNTR_CTERM) X(SPEEDCNTR_PTERM)
 
@@ -172,6 +173,8 @@
       PARAM_NAMED(SPEEDREF_DECEL_RPM_PER_S) " must be 0, for SPEEDREFRAMP_RPM_PER_S, or at least 1") \
     X(RECORDER_PERIODS != 1 && ((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
       PARAM_NAMED(RECORDER_PERIODS) " must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
+    X(PARAM_F(BRIDGE_RS_OHM) >= 0.0F && PARAM_F(BRIDGE_RS_OHM) <= 1.0F, \
+      "BRIDGE_RS_OHM must be 0 .. 1 ohm: the on-resistance of a transistor and half of the shunt's") \
     X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, \
       "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
     X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, \

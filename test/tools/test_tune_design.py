@@ -13,6 +13,7 @@ from tools.common import board_file, motor_file
 from tools.common.errors import UserError
 from tuning import constants, header, limits, report
 from tuning.design import Design, design, plain, real, short
+from tuning.design_result import spread_of
 from tuning.limits import Envelope
 
 BOARD = board_file.load("mclv")
@@ -79,8 +80,18 @@ FAST = {"pole_pairs": 7, "rs_ohm": 0.45, "ld_h": 3e-4, "lq_h": 3e-4, "kphi_v_per
 GIMBAL = {"pole_pairs": 7, "rs_ohm": 5.0, "ld_h": 1.5e-3, "lq_h": 1.5e-3, "kphi_v_per_krpm": 40.0, "psi_vs": 40.0 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 7),
           "inertia_kgm2": 1.2e-5, "coulomb_nm": 8e-3, "viscous_nms": 0.0, "rated_torque_nm": 0.18, "rated_current_a": 0.6, "rated_speed_rpm": 130.0, "maximum_speed_rpm": 140.0,
           "maximum_current_a": 0.9, "start_torque_nm": 0.03, "board": {"current_full_scale_a": 1.3, "adc_bits": 14}}
+LOW_OHM = {"rs_ohm": 0.04, "ld_h": 1e-4, "lq_h": 1e-4, "coulomb_nm": 0.02}
+
+
+def with_supply(ohm: float) -> dict:
+    """The board, at the end of such a supply and its cable."""
+    return {"quantities": BOARD.quantities | {"supply.resistance": replace(BOARD.quantities["supply.resistance"], value_si=ohm)}}
+
+
 WARNED = {
-    "rounding over a tenth of a percent": ({"rs_ohm": 0.0233}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "lower [shunt] amplifier_gain to")),
+    "rounding over a tenth of a percent": ({"rs_ohm": 0.0233, "board": {"rds_on_ohm": 0.001, "shunt_ohm": 0.002}}, ("MOTOR_RS_OHM = 0.0233 is rounded by", "lower [shunt] amplifier_gain to")),
+    "supply whose resistance takes too much": (
+        {"board": with_supply(8.0), "rated_torque_nm": 0.07}, ("8 ohm of the supply leave", "of 24 V with half the rated torque", "; lower [supply] resistance to ", "or lower the rated speed to")),
     "rated torque that the voltage does not allow": ({"changes": (("value = 2500", "value = 2800"),)}, ("too low for the rated torque at rated speed",)),
     "maximum current beyond the firmware's range": (
         {"changes": (*OTHER, HEAVIER, ("value = 2.75", "value = 24")), "board": {"current_full_scale_a": 60.0}},
@@ -189,6 +200,32 @@ def test_what_cannot_work_is_refused_in_one_line_with_a_remedy(motor, says):
 def test_what_works_with_a_cost_is_warned_about(motor, says):
     warnings = made(**motor).warnings
     assert any(all(words in f"{warning}$" for words in says) for warning in warnings), warnings
+
+
+def test_the_supply_s_resistance_and_the_rated_speed_that_the_warning_names_are_enough():
+    words = next(warning for warning in made(board=with_supply(8.0), rated_torque_nm=0.07).warnings if "ohm of the supply" in warning)
+    ohm, rpm = (float(re.search(f"{what} to ([0-9.]+)", words)[1]) for what in ("resistance", "rated speed"))
+    for design_now in (made(board=with_supply(ohm), rated_torque_nm=0.07), made(board=with_supply(8.0), rated_torque_nm=0.07, rated_speed_rpm=rpm)):
+        assert not any("ohm of the supply" in warning for warning in design_now.warnings)
+    assert 1.0 < ohm < 8.0 and 1500.0 < rpm < 2500.0
+
+
+def test_a_bridge_that_counts_beside_the_winding_is_a_define_of_its_own_and_in_the_model():
+    bridge_ohm = BOARD.rds_on_ohm + 0.5 * BOARD.shunt_ohm
+    usual, low = made(), made(**LOW_OHM)
+    assert "BRIDGE_RS_OHM" not in usual.params and "BRIDGE_RS_OHM" not in header.write(usual)
+    assert (low.value("MOTOR_RS_OHM"), low.value("BRIDGE_RS_OHM")) == (0.04, approx(bridge_ohm)) and low.plant.rs == approx(0.04 + bridge_ohm)
+    assert re.search(r"^#define BRIDGE_RS_OHM 0\.0\d+ +/\* \[ohm\] a transistor and half of the shunt", header.write(low), re.MULTILINE)
+    counts = {name: constants.evaluate(low.params | ohm, "NORM_RS")[0] for name, ohm in (("both", {}), ("one", {"MOTOR_RS_OHM": plain(0.04 + bridge_ohm), "BRIDGE_RS_OHM": "0"}))}
+    assert counts["both"] == counts["one"] > constants.evaluate(low.params | {"BRIDGE_RS_OHM": "0"}, "NORM_RS")[0]
+    assert f"0.04 ohm and {bridge_ohm:.2g} ohm of the bridge, " in report.text(low) and "of the bridge" not in report.text(usual)
+
+
+def test_a_spread_of_the_winding_is_less_of_the_whole_where_the_bridge_counts():
+    motor, board = parts(**LOW_OHM)
+    spread = design(replace(motor, spread={"rs_ohm": (0.03, 0.05)}), board)
+    bridge_ohm = spread.bridge_ohm
+    assert bridge_ohm > 0.0 and spread_of(spread.motor)["rs"] == (approx((0.03 + bridge_ohm) / (0.04 + bridge_ohm)), approx((0.05 + bridge_ohm) / (0.04 + bridge_ohm)))
 
 
 def test_a_motor_within_all_limits_has_no_warning():

@@ -442,7 +442,7 @@ def test_who_runs_a_header_hears_of_every_mistake(tmp_path):
     assert ["MOTOR_RS_OHM is missing" in line for line in told.value.lines] == [True, False] and "KCURRA = 5 is outside" in told.value.lines[1]
 
 
-def test_the_optional_gains_are_those_that_have_a_default():
-    scaling = (paths.ROOT / "include/drive/scaling/controllers.h").read_text(encoding="utf-8")
+def test_the_optional_numbers_are_those_that_have_a_default():
+    scaling = "".join((paths.ROOT / f"include/drive/scaling/{name}.h").read_text(encoding="utf-8") for name in ("estimator", "controllers"))
     listed = [name for name, in rows("include", "drive/param_limits.h", "PARAM_OPTIONAL", "#name")]
     assert listed == re.findall(r"^#ifndef (\w+?)(?<!_H)\b", scaling, re.MULTILINE) and not set(listed) & (set(parameters()) | set(modes()))

@@ -176,6 +176,7 @@ RELATIONS = {
         case("D_CURRCNTR_PTERM", "1.0", "0.99"), case("Q_CURRCNTR_PTERM", "1.0", "0.99"),
         case("MOTOR_LS_MH", "4.0", "3.8", CURRENT_BANDWIDTH_HZ="2000")],
     "the current integral exceeds its Q format": [case("D_CURRCNTR_ITERM", "15.95", "15.85"), case("Q_CURRCNTR_ITERM", "15.95", "15.85")],
+    "BRIDGE_RS_OHM must be 0 .. 1 ohm": [case("BRIDGE_RS_OHM", "-0.001", "0"), case("BRIDGE_RS_OHM", "1.01", "0.021")],
     "the speed gain exceeds its Q format": [case("SPEEDCNTR_PTERM", "1.0", "0.99")],
     "MOTOR_INERTIA_KGM2 does not fit the load observer's format": [
         case("MOTOR_INERTIA_KGM2", "6.1e-7", "6.2e-7"), case("MOTOR_INERTIA_KGM2", "4.1e-2", "4.0e-2", SPEED_BANDWIDTH_HZ="0.2")],

@@ -14,8 +14,13 @@
 #include "drive/scaling/current_voltage.h"
 
 /* ---- AN1292's motor constants, pre-divided by 2, 256 and 2. The estimator has formats of its own for R and L, which fit where these two end at 32767. ---- */
+#ifndef BRIDGE_RS_OHM
+#define BRIDGE_RS_OHM 0 /* transistor and half of the shunt, where that counts beside the winding */
+#endif
+/** What a phase's current meets: winding and bridge. */
+#define PARAM_PHASE_OHM (PARAM_F(MOTOR_RS_OHM) + PARAM_F(BRIDGE_RS_OHM))
 #define PARAM_AN1292(x) ((int16_t)PARAM_ROUND(((x) < 32767.0F) ? (x) : 32767.0F))
-#define NORM_RS PARAM_AN1292(PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 16384.0F)
+#define NORM_RS PARAM_AN1292(PARAM_PHASE_OHM *PARAM_IU * 16384.0F)
 #define NORM_LSDTBASE PARAM_AN1292(PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 128.0F)
 #define PARAM_INVKFI (PARAM_SQRT3 * 1000.0F * PARAM_F(NOPOLESPAIRS) * NORM_VOLTAGE_CONST / PARAM_F(MOTOR_KPHI_V_PER_KRPM) * 16384.0F / PARAM_F(SPEED_UNIT))
 #define NORM_INVKFIBASE ((int16_t)PARAM_ROUND(PARAM_INVKFI))
@@ -29,7 +34,7 @@
 #define PARAM_EXP(x) ((uint16_t)(((x) < 65535.0F) ? 0 : ((x) < 131071.0F) ? 1 \
                                                     : ((x) < 262143.0F)   ? 2 \
                                                                           : 3))
-#define PARAM_RS_FULL (PARAM_F(MOTOR_RS_OHM) * PARAM_IU * 32768.0F)
+#define PARAM_RS_FULL (PARAM_PHASE_OHM * PARAM_IU * 32768.0F)
 #define PARAM_LS_FULL (PARAM_F(MOTOR_LS_MH) * 0.001F / PARAM_F(LOOPTIME_SEC) * PARAM_IU * 4096.0F)
 #define PARAM_SCALED(x, exp) ((uint16_t)((x) / (float)(1 << (exp)) + 0.5F))
 #define PARAM_RS_EXP PARAM_EXP(PARAM_RS_FULL)
@@ -49,7 +54,7 @@
 /* ---- The back-EMF's format ---- */
 #define PARAM_EMF_MAX_V (PARAM_MOST_V + PARAM_TRIP_RI_V + PARAM_LDI_V)
 #define PARAM_MOST_V (PARAM_USED_BUS_V / PARAM_SQRT3)
-#define PARAM_TRIP_RI_V (2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_F(MOTOR_RS_OHM))
+#define PARAM_TRIP_RI_V (2.0F / PARAM_SQRT3 * PARAM_F(OVER_CURRENT_THRESHOLD_A) * PARAM_PHASE_OHM)
 #define PARAM_FASTEST_RPM PARAM_MAX(PARAM_F(MAXIMUM_SPEED_RPM), PARAM_F(PARAM_OLD_LONGER) * PARAM_F(NOMINAL_SPEED_RPM))
 #define PARAM_LDI_V (2.0F * PARAM_PI / 60.0F * PARAM_FASTEST_RPM * PARAM_F(NOPOLESPAIRS) * PARAM_LS_RAISED * PARAM_F(MOTOR_LS_MH) * 0.001F * PARAM_F(MAXIMUM_CURRENT_A))
 #define PARAM_EMF_END_V (PARAM_F(PARAM_EMF_SHARE) * 131068.0F * NORM_VOLTAGE_CONST)

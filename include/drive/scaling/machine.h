@@ -28,7 +28,7 @@
     }
 
 /** What R of the header takes more of voltage from one turn of ALIGN to the next; 0 where that is not to be told from rounding or from back-EMF. */
-#define PARAM_ALIGN_RI_V (PARAM_F(MOTOR_RS_OHM) * PARAM_F(Q_CURRENT_REF_OPENLOOP))
+#define PARAM_ALIGN_RI_V (PARAM_PHASE_OHM * PARAM_F(Q_CURRENT_REF_OPENLOOP))
 #define PARAM_ALIGN_EMF_V (60.0F * PARAM_F(PARAM_ALIGN_TURNS) / (PARAM_F(LOCK_TIME) * PARAM_F(LOOPTIME_SEC)) / PARAM_ERPM_PER_V)
 #define PARAM_ALIGN_RISE_Q14 VOLTAGE_Q14(PARAM_ALIGN_RI_V / PARAM_F(PARAM_ALIGN_TURNS))
 #define PARAM_ALIGN_TEACHES (PARAM_ALIGN_EMF_V < PARAM_F(ALIGN_EMF_MOST) * PARAM_ALIGN_RI_V && PARAM_ALIGN_RISE_Q14 >= ALIGN_RISE_LEAST)
@@ -52,7 +52,7 @@
 
 /** Speed below which the short-circuited winding takes at most MAXIMUM_CURRENT_A, Kphi n/sqrt(3) = R I, in counts (STOP_MODE 2). R stands for |Z|:
  *  the current's first swing goes beyond what stays, by as much as w L takes off. */
-#define PARAM_BRAKE_COUNTS PARAM_MIN(SPEED_COUNTS(PARAM_F(MAXIMUM_CURRENT_A) * PARAM_F(MOTOR_RS_OHM) * PARAM_ERPM_PER_V), 32767.0F)
+#define PARAM_BRAKE_COUNTS PARAM_MIN(SPEED_COUNTS(PARAM_F(MAXIMUM_CURRENT_A) * PARAM_PHASE_OHM * PARAM_ERPM_PER_V), 32767.0F)
 
 /** Supply current as a q current at the voltage circle: V I = 3/2 u i with V = sqrt(3) u / top, top the highest duty. Q13 counts. */
 #define PARAM_SUPPLY_Q13 (2.0F * PARAM_F(SUPPLY_CURRENT_LIMIT_A) * PARAM_F(PWM_FULL_DUTY) / (PARAM_SQRT3 * PARAM_F(PWM_TOP_DUTY)))
