@@ -172,7 +172,7 @@ def test_several_mistakes_of_a_kind_are_a_line_each(tmp_path, compiler):
 
 WRONG = {"MOTOR_RS_OHM": "5/2", "MOTOR_LS_MH": "two", "MOTOR_KPHI_V_PER_KRPM": None, "NOMINAL_SPEED_RPM": "02800", "KCURRB": "0.5", "LOCK_TIME": "(x)",
          "REGEN_LIMIT_V": "20", "SPEED_BANDWIDTH_HZ": "(12.6", "KFILTER_ESDQ": "9", "INVKFI_SPEED2": None, "IDREF_SPEED9": "1 /0", "SNAPDELAY": "(010)",
-         "RETRY_COUNT": "99", "RETRY_PAUSE_SEC": "1.0 * (5/2)"}
+         "RETRY_COUNT": "99", "RETRY_PAUSE_SEC": "1.0 * (5/2)", "SAMPLE_WINDOW_SEC": "NORM_RS", "IDREF_SPEED3": "(unknown / 2)"}
 
 
 def test_mistakes_of_all_kinds_are_told_in_one_build(tmp_path):
@@ -185,6 +185,35 @@ def test_mistakes_of_all_kinds_are_told_in_one_build(tmp_path):
     assert code == 2 and sorted(told) == sorted({"KCRURA", *WRONG} - {"KCURRB"}) and len(lines) == len(told), lines
     for name, line in told.items():
         assert line.startswith(f"foc33: {place(text, name) if WRONG.get(name, 1) else 'userparams.h'}: {name} "), line
+
+
+def test_an_entry_of_1_kphi_is_told_beside_other_mistakes_unless_it_may_be_their_fault(tmp_path):
+    wrong = value("INVKFI_SPEED3", "19750")
+    code, lines = checked(tmp_path, PC, wrong.replace(line_of("LOCK_TIME"), "").replace(line_of("KFILTER_ESDQ"), "#define KFILTER_ESDQ 9\n"))
+    assert code == 2 and sorted(line.split(": ", 2)[2].split()[0] for line in lines) == ["INVKFI_SPEED3", "KFILTER_ESDQ", "LOCK_TIME"], lines
+    code, lines = checked(tmp_path, PC, wrong.replace(line_of("MOTOR_KPHI_V_PER_KRPM"), ""))
+    assert code == 2 and len(lines) == 1 and "MOTOR_KPHI_V_PER_KRPM is missing" in lines[0], lines
+
+
+WORDS = {
+    "(two)": "uses two, which nothing defines: write a number, 0.01 .. 40 ohm",
+    "(NORM_RS)": "uses NORM_RS, which follows from the parameters: write a number, 0.01 .. 40 ohm",
+    "2 * RS_COLD": "uses RS_COLD, which nothing defines: write a number, 0.01 .. 40 ohm",
+    "0.001 * MOTOR_LS": "uses MOTOR_LS, which nothing defines: did you mean MOTOR_LS_MH?",
+    "MY_RS\n#define MY_RS (0.5 * NOTHING)": "uses NOTHING, which nothing defines: write a number, 0.01 .. 40 ohm",
+    "MY_RS\n#define MY_RS (1.0 * MOTOR_RS_OHM)": "comes back to MOTOR_RS_OHM itself: write a number, 0.01 .. 40 ohm",
+}
+
+
+@pytest.mark.parametrize("text", WORDS)
+def test_a_word_that_leads_nowhere_is_told_by_its_name_and_not_in_the_words_of_the_compiler(tmp_path, text):
+    changed = value("MOTOR_RS_OHM", text)
+    assert checked(tmp_path, PC, changed) == (2, [f"foc33: {place(changed, 'MOTOR_RS_OHM')}: MOTOR_RS_OHM = {text.splitlines()[0]} {WORDS[text]}"])
+
+
+def test_what_is_computed_from_a_missing_parameter_is_no_mistake_of_its_own(tmp_path):
+    code, lines = checked(tmp_path, PC, value("LOCK_TIME", "ALIGN\n#define ALIGN (2 * END_SPEED_RPM)").replace(line_of("END_SPEED_RPM"), ""))
+    assert code == 2 and len(lines) == 1 and "END_SPEED_RPM is missing" in lines[0], lines
 
 
 def test_every_name_that_a_header_does_not_have_is_told_in_one_build(tmp_path):
@@ -214,7 +243,6 @@ def test_a_number_that_only_the_build_sees_is_octal_is_told(tmp_path):
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("text, told", [
-    ("(two)", r"MOTOR_RS_OHM is no number \('two' undeclared.*\): write one, 0.01 \.\. 40 ohm"),
     ("2.6.7", r"MOTOR_RS_OHM is no number \(too many decimal points in number\): write one, 0.01 \.\. 40 ohm"),
     ("(2.67", r"MOTOR_RS_OHM is no number \(.*\): write one, 0.01 \.\. 40 ohm"), ("2 +", r"MOTOR_RS_OHM is no number \(.*\): write one")])
 def test_what_only_the_compiler_finds_is_told_with_the_parameter(tmp_path, compiler, text, told):
@@ -353,6 +381,8 @@ LEGAL = {
     "gains of two signs, on purpose": value("KCURRB", "0.5") + "#define KCURR_SIGNS_DIFFER\n",
     "a share of 1/Kphi": value("INVKFI_SPEED3", "(NORM_INVKFIBASE * 1.1)"),
     "a negative expression": value("KCURRA", "-(0.25 + 0.25)"),
+    "an enum's constant and the compiler's": "enum { TURNS = 4 };\n#include <limits.h>\n" + value("LOCK_TIME", "(TURNS * 4000)").replace(
+        line_of("END_SPEED_RPM"), "#define END_SPEED_RPM (CHAR_BIT * 125)\n"),
     "names of one's own": HEADER.replace(
         RS, "#define RS_COLD 2.5\n#define WARM(ohm, factor) ((ohm) * (factor))\n#define MOTOR_RS_OHM WARM(RS_COLD, 1.068)\n"),
     "one of one's own that resembles a parameter": HEADER.replace(

@@ -14,9 +14,11 @@ function place_of(text,   word, count, words, i) {
     return header
 }
 
-# Whether a relation may be told beside other mistakes: not if it needs the whole header, or names what is refused.
+# Whether a relation may be told beside other mistakes: not if it needs the whole header, or names what is refused. An entry of 1/Kphi also needs what that
+# is computed from.
 function stands_alone(text,   count, words, i) {
-    if (name ~ /relations_(rest|entries)/) return 0
+    if (name ~ /relations_rest/) return 0
+    if (name ~ /relations_entries/) text = text " NOPOLESPAIRS MOTOR_KPHI_V_PER_KRPM NOMINAL_BUS_V DEADTIME_SEC LOOPTIME_SEC MAXIMUM_SPEED_RPM INVKFI_SPEED0"
     gsub(/[^A-Za-z0-9_]+/, " ", text)
     count = split(text, words, " ")
     for (i = 1; i <= count; i++)

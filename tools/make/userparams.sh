@@ -65,6 +65,7 @@ checked() {
 : >"$work/places"
 : >"$work/refused"
 : >"$work/near"
+: >"$work/foreign"
 header=userparams.h
 known='#include "drive/param_limits.h"
 #include "drive/modes/mode_table.h"
@@ -84,7 +85,7 @@ header=$(awk '/^# 1 ".*userparams\.h"/ {
     exit
 }' "$work/defined")
 command -v python3 >/dev/null || echo "foc33: no python3: a misspelt name in $header is not looked for" >&2
-awk -v places="$work/places" -v refused="$work/refused" -v near="$work/near" -v least="$work/least" -f tools/make/nearest.awk -f tools/make/userparams.awk \
+awk -v places="$work/places" -v refused="$work/refused" -v near="$work/near" -v least="$work/least" -v foreign="$work/foreign" -f tools/make/nearest.awk -f tools/make/userparams.awk \
     "$work/known" "$work/defined" >&2 || exit 2 # a header of AN1292
 
 # The replaced header comes before the user's: in front of the compiler's first option.
@@ -100,6 +101,8 @@ for word; do
 done
 
 checked firmware/drive/param_text.c "$@"
+awk -F '\t' -v refused="$work/refused" 'FILENAME ~ /refused$/ { told[$1] = 1; next } !($1 in told) { print "foc33: " $2; print $1 >>refused }' \
+    "$work/refused" "$work/foreign" >&2
 {
     printf '#include <userparams.h>\n'
     sed 's/^\([A-Z_0-9]*\).*/"\1" \1/' "$work/least"
