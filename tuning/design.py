@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import replace
 
 from tools.common import paths
@@ -93,17 +94,25 @@ def _refuse_impossible(d: Design, currents: limits.Currents, problems: Problems)
                _current_remedy(d, currents, needed_a))
     if not problems.found and e.least_id(m.rated_speed_rpm, half, limits.FULL_SHARE) is None:
         refuse(f"{d.board.nominal_bus_v:g} V are too low for {m.rated_speed_rpm:g} rpm at half the rated torque", d.where("speed"), _voltage_remedy(d, half))
+    for name, key, value in (("MOTOR_RS_OHM", "resistance", m.rs_ohm - d.bridge_ohm), ("MOTOR_LS_MH", "inductance", 1e3 * m.lq_h)):
+        low, high = range_of(name)
+        if not low <= value <= high:
+            refuse(f"{name} = {value:.4g} is outside {low:g} .. {high:g}", d.where(key), f"it follows from [electrical] {key}; change that")
 
 
 def _voltage_remedy(d: Design, torque_nm: float) -> str:
     """What to change where the voltage is too low for a torque at rated speed."""
     m, e = d.motor, d.envelope
 
-    def reaches(x: Envelope) -> bool:
-        return x.least_id(m.rated_speed_rpm, torque_nm, limits.FULL_SHARE) is not None
-    found = remedies.either(remedies.raise_supply(remedies.least_supply(e, d.board, reaches)),
+    needed_v = remedies.needed_supply(m, d.board, _reaches(m, torque_nm))
+    found = remedies.either(remedies.raise_supply(needed_v if needed_v <= remedies.MOST_SUPPLY_V else None),
                             remedies.lower_rated_speed(e.highest_speed(torque_nm, limits.FULL_SHARE), m))
-    return found or f"the motor needs {remedies.needed_supply(e, d.board, reaches):g} V, the firmware's supply ends at {remedies.MOST_SUPPLY_V:g} V: take another winding"
+    return found or f"the motor needs {needed_v:g} V, the firmware's supply ends at {remedies.MOST_SUPPLY_V:g} V: take another winding"
+
+
+def _reaches(m: Motor, torque_nm: float) -> Callable[[Envelope], bool]:
+    """Whether an envelope has a torque at rated speed."""
+    return lambda x: x.least_id(m.rated_speed_rpm, torque_nm, limits.FULL_SHARE) is not None
 
 
 def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> str:
@@ -120,12 +129,18 @@ def _current_remedy(d: Design, currents: limits.Currents, needed_a: float) -> st
     return "with more current R I + L dI/dt leave the back-EMF's number format: lower maximum_speed, or raise the supply voltage"
 
 
+def _speed_v(d: Design) -> float:
+    """What half the rated torque at rated speed needs, so that one change of the supply is enough; 0 where the current does not allow that torque."""
+    m, half = d.motor, 0.5 * d.motor.rated_torque_nm
+    return remedies.needed_supply(m, d.board, _reaches(m, half)) if d.envelope.iq(m.rated_speed_rpm, half) <= limits.currents(m, d.board).maximum_a else 0.0
+
+
 def _refuse_kphi(d: Design) -> None:
     """1/Kphi has 16 bits: the electrical speed at full voltage must be 2048 .. 65534 counts."""
     counts = d.scales.invkfi
     least = range_of("INVKFI_SPEED0")[0]
     if counts < least:
-        needed_v = math.ceil(d.board.nominal_bus_v * least / counts)
+        needed_v = math.ceil(max(d.board.nominal_bus_v * least / counts, _speed_v(d)))
         end = "" if needed_v <= remedies.MOST_SUPPLY_V else f", but the firmware's supply ends at {remedies.MOST_SUPPLY_V:g} V: take another winding"
         raise UserError(f"1/Kphi has only {counts:.0f} counts for {d.motor.kphi_v_per_krpm:.4g} V/krpm and {d.motor.pole_pairs} pole pairs, {least:g} is the least",
                         d.where("kphi"), f"the motor is too slow for {d.board.nominal_bus_v:g} V: use at least {needed_v} V{end}")

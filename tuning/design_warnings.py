@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from tools.bench import reach
 from tools.common.board_file import TABLES
 from tools.common.motor_file import Motor
 
@@ -23,6 +24,8 @@ MOST_INVKFI = 32766.0
 """Counts of 1/Kphi: a slower motor counts its speed finer."""
 LONG_RAMP_S = 30.0
 """To the rated speed: a user who turns the potentiometer up waits for it."""
+AT_ONCE_SHARE = 0.9
+"""Of the drive's answer: the shipped motors' rotors, from 0.95 of it up, come back from each step of `make loadsteps`."""
 HEAVIER_FACTORS = (1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 36.0)
 KPHI_FACTORS = {math.sqrt(2.0): "peak and RMS", math.sqrt(3.0): "line to line and phase"}
 
@@ -34,7 +37,7 @@ def of_numbers(d: Design, currents: limits.Currents) -> list[str]:
 
 def of_running(d: Design) -> list[str]:
     """What makes the motor slow, or lets it down under load."""
-    return [*_slow_loop(d), *_slow_ramp(d), *_held(d)]
+    return [*_slow_loop(d), *_slow_ramp(d), *_held(d), *_at_once(d)]
 
 
 def warning(what: str, *ways: str) -> str:
@@ -297,6 +300,24 @@ def _held(d: Design) -> list[str]:
                         f"{d.value('NOMINAL_SPEED_RPM'):g}, before the drive answers", _heavier(d, torque))]
     return [warning(f"MINIMUM_SPEED_RPM = {least:g}: a load of {torque:.3g} N m that comes within {load_onset.ONSET_S:g} s stops the rotor there, "
                     + (f"{held_nm:.2g} N m are held" if held_nm > 0.0 else "none is held"), f"set MINIMUM_SPEED_RPM to {rpm:g} in [tune]")]
+
+
+def _at_once(d: Design) -> list[str]:
+    """A brake that closes at once, as in `make loadsteps`: a rotor that it stops before the drive has an answer may not come back."""
+    m, nominal, torque = d.motor, d.value("NOMINAL_SPEED_RPM"), load_onset.asked_nm(d)
+    if not load_onset.holds(d, nominal, torque): # told by _held
+        return []
+    answers_s, rpm = load_onset.answer_s(d), max(d.value("MINIMUM_SPEED_RPM"), load_onset.step_rpm(d))
+
+    def stops_s(speed_rpm: float, inertia: float = d.inertia_kgm2) -> float:
+        return reach.stops_s({"mech.inertia_kgm2": inertia, "mech.coulomb_nm": m.coulomb_nm, "mech.viscous_nms": m.viscous_nms}, speed_rpm, torque)
+    if stops_s(rpm) >= AT_ONCE_SHARE * answers_s:
+        return []
+    least = limits.digits_up(limits.halved(lambda speed: stops_s(speed) < answers_s, rpm, nominal, 20), 2)
+    heavier = limits.digits_up(1.02 * d.inertia_kgm2 * answers_s / stops_s(rpm) - m.inertia_kgm2, 2)
+    return [warning(f"a brake that closes at once with {torque:.3g} N m stops so light a rotor at {rpm:g} rpm in {1e3 * stops_s(rpm):.2g} ms, the drive answers in "
+                    f"{1e3 * answers_s:.2g} ms, and the speed may not come back",
+                    f"set MINIMUM_SPEED_RPM to {least:g} in [tune]" if least < nominal else f"raise [load] inertia to {heavier:g} kg m2")]
 
 
 def _heavier(d: Design, load_nm: float) -> str:

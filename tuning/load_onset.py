@@ -12,7 +12,7 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from tools.bench import lowspeed
+from tools.bench import case, loadsteps, lowspeed, reach
 from tools.common import paths
 from tools.common.param_rows import number, slow_periods
 
@@ -24,6 +24,7 @@ from .loops import ESDQ_RATIO, FAST_GAIN, FULL_RATIO, LOADED_SHARE, QUIET_RATIO
 LOWSPEED = lowspeed.Table.read(paths.TABLES / "lowspeed.toml")
 ONSET_S, CURRENT_SHARE = LOWSPEED.torque_over_s, LOWSPEED.current_percent / 100.0
 """What `make lowspeed` asks for: the load comes within this time, and takes so much of the largest current at most."""
+LOADSTEPS = loadsteps.Table.read(paths.TABLES / "loadsteps.toml")
 MARGIN = 1.15
 """Of the speed that the model holds. With it 16 loads on 8 motors that their rotor's inertia limits were named 0.89 to 1.16 of the lowest speed that
 the virtual board held."""
@@ -89,6 +90,16 @@ def _program() -> Callable[..., float]:
 def asked_nm(d: Design) -> float:
     """The rated torque, as far as the current allows; friction comes on top."""
     return min(d.motor.rated_torque_nm, CURRENT_SHARE * d.value("MAXIMUM_CURRENT_A") * d.motor.kt_nm_per_a)
+
+
+def step_rpm(d: Design) -> float:
+    """The lowest speed at which `make loadsteps` closes the brake."""
+    return min(case.shares(LOADSTEPS.motor, d.motor, LOADSTEPS.speeds_rpm, [])[0])
+
+
+def answer_s(d: Design) -> float:
+    """How soon the drive answers a load."""
+    return reach.answer_s({"LOOPTIME_SEC": d.board.pwm_period_s, **{name: d.value(name) for name in ("KFILTER_ESDQ", "CURRENT_BANDWIDTH_HZ", "LOAD_BANDWIDTH_HZ")}})
 
 
 def held(d: Design, rpm: float, load_nm: float, inertia: float = 0.0, over_s: float = ONSET_S) -> bool:

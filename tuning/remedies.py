@@ -39,12 +39,14 @@ def raise_supply(volt: float | None) -> str:
     return f"raise the supply voltage to {volt:g} V" if volt else ""
 
 
-def needed_supply(envelope: Envelope, board: BoardFile, holds: Callable[[Envelope], bool]) -> float:
-    """The same whatever the firmware takes, to two digits."""
-    volt = board.nominal_bus_v
-    while not holds(replace(envelope, circle_v=envelope.circle_v * volt / board.nominal_bus_v)):
-        volt *= 1.05
-    return limits.digits_up(volt, 2)
+def needed_supply(motor: Motor, board: BoardFile, holds: Callable[[Envelope], bool]) -> float:
+    """The same whatever the firmware takes, to two digits, with the current that the back-EMF's format leaves at that supply."""
+    ratio = 1.0
+    while True:
+        higher = replace(board, nominal_bus_v=limits.digits_up(ratio * board.nominal_bus_v, 2), over_voltage_v=ratio * board.over_voltage_v)
+        if holds(Envelope(motor, limits.circle_v(higher), limits.fit_emf(motor, higher, limits.currents(motor, higher)).maximum_a)):
+            return higher.nominal_bus_v
+        ratio *= 1.01
 
 
 def lower_rated_speed(rpm: float, motor: Motor) -> str:

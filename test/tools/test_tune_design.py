@@ -116,6 +116,10 @@ WARNED = {
     "light rotor that a load stops": ({"changes": (("value = 5.5e-6", "value = 2e-6"),)},
                                       ("MINIMUM_SPEED_RPM = 150: a load of 0.08 N m that comes within 0.5 s stops the rotor there", "set MINIMUM_SPEED_RPM to")),
     "rotor so light that no speed holds": (GIMBAL, ("stops so light a rotor at every speed up to NOMINAL_SPEED_RPM = 130", "; raise [load] inertia to")),
+    "light rotor that a brake stops at once": (GIMBAL | {"inertia_kgm2": 2.2e-5, "rated_speed_rpm": 300.0, "maximum_speed_rpm": 400.0, "board": {}},
+                                               ("stops so light a rotor at 53.6 rpm in 0.66 ms, the drive answers in 2.8 ms", "; set MINIMUM_SPEED_RPM to 230 in [tune]$")),
+    "light rotor that a brake stops at once at any speed": (GIMBAL | {"inertia_kgm2": 2.2e-5, "rated_speed_rpm": 200.0, "maximum_speed_rpm": 210.0},
+                                                            ("stops so light a rotor at 35.7 rpm in 0.44 ms, the drive answers in 2.8 ms", "; raise [load] inertia to")),
     "swing that a tuned lock leaves": ({"changes": NO_FRICTION, "more": "[tune]\nLOCK_TIME = 4000\n"}, ("the unloaded rotor still swings by", "remove LOCK_TIME from [tune]")),
     "swing that a small inductance feeds": ({"changes": (*SMALL_MOTOR, ("value = 1.92", "value = 0.1"))}, ("feeds the swing", "by chokes in the motor's leads")),
     "heavy load's slow reference": ({"more": INERTIA % "3e-3"}, ("SPEEDREFRAMP_RPM_PER_S = 76: 33 s to the rated speed", "at most 30% of rated torque")),
@@ -176,6 +180,38 @@ def test_a_motor_for_mains_voltage_is_told_what_it_needs_and_not_to_turn_at_one_
     assert 40.0 < float(re.search(r"raise the supply voltage to ([\d.]+) V$", said)[1]) <= 60.0
     with pytest.raises(UserError, match="the motor needs [0-9]+ V, the firmware's supply ends at 60 V: take another winding"):
         made(**washer | {"rs_ohm": 38.0, "ld_h": 29e-3, "lq_h": 29e-3})
+
+
+def refused(motor: motor_file.Motor, board: board_file.BoardFile) -> str:
+    """What the tuner refuses; "" for nothing."""
+    try:
+        design(motor, board)
+    except UserError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("kphi, rs_ohm, ls_h, rpm", [(95.0, 4.5, 30e-3, 2000.0), (31.4, 2.9, 8e-3, 500.0), (44.8, 5.4, 29e-3, 500.0), (28.7, 9.0, 29e-3, 1000.0), (51.5, 2.0, 10e-3, 500.0)])
+def test_a_motor_that_is_too_slow_for_the_supply_is_told_a_voltage_that_is_enough_or_that_none_is(kphi, rs_ohm, ls_h, rpm):
+    psi_vs, amps = kphi / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 2), 1.5
+    torque_nm = 0.95 * 3.0 * psi_vs * amps
+    motor, board = parts(pole_pairs=2, kphi_v_per_krpm=kphi, psi_vs=psi_vs, rs_ohm=rs_ohm, ld_h=ls_h, lq_h=ls_h, rated_speed_rpm=rpm, maximum_speed_rpm=1.3 * rpm, viscous_nms=0.0,
+                         rated_current_a=amps, maximum_current_a=2.0, rated_torque_nm=torque_nm, coulomb_nm=0.04 * torque_nm, start_torque_nm=0.2 * torque_nm, inertia_kgm2=torque_nm / rpm)
+    said = refused(motor, board)
+    volt = float(re.search(r"the motor is too slow for 24 V: use at least ([\d.]+) V", said)[1])
+    if volt > 60.0:
+        assert said.endswith("but the firmware's supply ends at 60 V: take another winding")
+        return
+    ratio = volt / board.nominal_bus_v
+    supplied = replace(board, nominal_bus_v=volt, **{name: ratio * getattr(board, name) for name in ("bus_full_scale_v", "over_voltage_v", "under_voltage_v", "regen_limit_v")})
+    left = refused(motor, supplied)
+    assert "too slow" not in left and "too low for" not in left, left
+
+
+def test_a_value_outside_the_firmware_s_range_is_told_beside_the_supply_that_is_too_low():
+    with pytest.raises(UserError) as caught:
+        made(kphi_v_per_krpm=12.0, psi_vs=12.0 / (math.sqrt(3.0) * 1000.0 * math.pi / 30.0 * 5), ld_h=35e-3, lq_h=35e-3, rated_speed_rpm=1500.0, rated_torque_nm=0.19)
+    assert "24 V are too low for 1500 rpm" in str(caught.value) and "MOTOR_LS_MH = 35 is outside 0.01 .. 30" in str(caught.value), caught.value
 
 
 def test_remedies_for_a_speed_that_would_wander_are_enough_and_hardly_more():
