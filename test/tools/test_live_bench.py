@@ -137,18 +137,20 @@ def test_numbers_and_curves_are_means_over_their_time_and_not_samples_at_the_rip
     last, frame, mean_nm = board.recent[-1], board.frame(), board.board.get("stat.torque_mean_nm")
     assert last.column("plant.torque_nm").mean() < 0.7 * mean_nm # every sample stands at the same edge: their mean is another
     assert frame["now"]["torque_nm"] == pytest.approx(mean_nm, abs=2e-4)
-    assert frame["now"]["i_q_a"] == pytest.approx(last.column("fw.i_q_a").mean(), abs=1e-4)
+    mean_a = mean_nm / (1.5 * board.rated.pole_pairs * board.board.get("motor.psi_vs"))
+    assert last.column("fw.i_q_a").mean() < 0.8 * mean_a and frame["now"]["i_q_a"] == pytest.approx(mean_a, rel=0.02)
+    assert frame["now"]["i_q_a"] == pytest.approx(view.currents(last)[view.MEAN_Q].mean(), abs=1e-4)
     assert frame["now"]["theta_deg"] == pytest.approx(last.column("plant.theta_e_deg")[-1], abs=1e-3) # of this moment
     rows = [row for row in frame["strip"] if row[0] > last.time_s[0] + 0.01]
     for row in rows:
         share = (last.time_s > row[0] - 0.01 + 2e-5) & (last.time_s <= row[0] + 2e-5)
         assert row[8] == pytest.approx(1000.0 * last.column("plant.torque_mean_nm")[share].mean(), abs=0.05)
-        assert row[5] == pytest.approx(last.column("fw.i_q_a")[share].mean(), abs=1e-3)
+        assert row[5] == pytest.approx(view.currents(last)[view.MEAN_Q][share].mean(), abs=1e-3)
     assert len(rows) == 4 and np.mean([row[8] for row in rows]) == pytest.approx(1000.0 * mean_nm, abs=0.5)
 
 
 def test_a_curve_has_a_gap_where_it_means_nothing_and_the_mean_of_what_does():
-    columns = {name: np.zeros(6) for name in virtual_board.SIGNALS} | {"plant.torque_mean_nm": np.array([1.0, 2.0, 3.0, 4.0, 5.0, 9.0]), "fw.i_q_a": np.arange(6.0),
+    columns = {name: np.zeros(6) for name in virtual_board.SIGNALS} | {"plant.torque_mean_nm": np.array([1.0, 2.0, 3.0, 4.0, 5.0, 9.0]), "plant.i_q_mean": np.arange(6.0),
                                                                        "pwm.outputs_seen": np.array([0.0, 63.0, 63.0, 63.0, 0.0, 63.0])}
     trace = Trace(list(columns), np.arange(6) * 0.1, np.array(list(columns.values())))
     assert [[row[0], row[5], row[8]] for row in view.strip(trace, 2, {})] == [[0.1, 1.0, 1500.0], [0.3, 2.5, 3500.0], [0.5, 5.0, 7000.0]]

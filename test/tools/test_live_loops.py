@@ -13,7 +13,7 @@ from live_support import Living, kept_parts, known, parts, recorder_parts, serve
 from support import refusal
 
 from tools.bench.scenario import BRAKE
-from tools.live import board, response
+from tools.live import board, response, step
 from tools.live.loop_response import FOLLOWS, LoopResponse
 from tools.live.pace import Pacemaker
 from tools.live.recording import Origin
@@ -80,12 +80,17 @@ def living():
 
 def test_a_motor_that_stands_is_refused_and_nothing_is_there_to_cancel_or_to_save(living):
     living.state("STOPPED")
-    refusal(lambda: living.do(measure="speed"), "a loop is measured while the motor turns, in CLOSED, loops: start the motor")
-    refusal(lambda: living.do(measure="cancel"), "no loop is being measured")
+    refusal(lambda: living.do(measure="speed"), "loops and steps are measured while the motor turns, in CLOSED, loops: start the motor")
+    refusal(lambda: living.do(measure="cancel"), "nothing is being measured")
     refusal(lambda: living.do(measure="sped"), "no loop 'sped', loops: choose one of current, speed")
     refusal(living.board.loop, "no loop is measured yet")
     frame = living.maker.call(living.board.frame).result(5)
-    assert set(frame["unmeasured"]) == {"speed", "current"} and all("in CLOSED" in why for why in frame["unmeasured"].values())
+    assert set(frame["measurable"]["why"]) == {"speed", "current", "step current", "step speed", "step load"}
+    assert all("in CLOSED" in why for why in frame["measurable"]["why"].values()) and frame["measurable"]["old"] == []
+    for wish, says in (({"step": "loads", "size": 10}, "no step 'loads'"), ({"step": "load"}, "no step 'None'"), ({"step": "load", "size": 101}, "choose 5 .. 100 % of the rated torque"),
+                       ({"step": "speed", "size": True}, "is impossible"), ({"step": "speed", "size": 10}, "in CLOSED")):
+        refusal(lambda wish=wish: living.do(measure=wish), says)
+    refusal(living.board.step, "no step is measured yet")
 
 
 def test_the_speed_loop_of_the_running_hurst_has_the_margin_of_the_model_while_the_traces_wait(living):
@@ -98,7 +103,7 @@ def test_the_speed_loop_of_the_running_hurst_has_the_margin_of_the_model_while_t
     living.do(measure="speed")
     until(lambda: living.board.scope.told["status"] == "lent", "the traces go on")
     living.messages.clear()
-    refusal(lambda: living.do(measure="current"), "the speed loop is being measured, loops: cancel that one or wait")
+    refusal(lambda: living.do(measure="current"), "the speed loop is being measured, loops: cancel that or wait")
     living.board.scope.ask(TRACE | {"factor": 2})
     assert living.board.scope.told["status"] == "lent"
     before = next(beats)
@@ -129,6 +134,53 @@ def test_the_current_loop_in_closed_loop_is_told_to_be_less_than_it_is(living):
     living.loops.count = 4
     assert told["loop"] == "current" and told["note"] == FOLLOWS and told["done"] == told["of"] == 8
     assert 900.0 < told["margins"]["measured"][1] < 1250.0 and abs(told["margins"]["difference"]) < 10.0
+
+
+@pytest.mark.parametrize("name, size, caption, peak", [
+    ("current", 5, "0.138 A", 0.15), ("speed", 10, "14", 0.05), ("load", 40, "32 mN·m", None)])
+def test_a_step_of_the_running_motor_is_as_the_model_says_and_nobody_has_lost_the_command(living, monkeypatch, name, size, caption, peak):
+    monkeypatch.setattr(step, "RECORDS", 2)
+    living.turning()
+    time.sleep(0.3)
+    before = living.maker.call(lambda: living.board.frame()["now"]).result(5)
+    living.do(measure={"step": name, "size": size})
+    refusal(lambda: living.do(measure="speed"), f"the step of the {name} is being measured, loops: cancel that or wait")
+    living.measured()
+    told = living.loops.steps.told
+    assert told["said"] == "mean of 2 steps" and told["caption"].startswith(f"Step of the {name}, {caption}") and " at 14" in told["caption"], told
+    assert len(told["time_ms"]) == len(told["measured"]) == len(told["model"]) > 50 and told["time_ms"][0] < 0.0 < told["time_ms"][-1]
+    measured, model = told["figures"]["measured"], told["figures"]["model"]
+    if name == "load":
+        assert 0.9 * model["peak"] < measured["peak"] < model["peak"] + 55.0 / 1400.0 and measured["settled_s"] is not None
+    else:
+        assert abs(measured["rise_s"] / model["rise_s"] - 1.0) < 0.3 and measured["peak"] < peak and 0.0 < told["ripple"] < 0.05
+    assert bool(told["note"]) == (name == "current")
+    after = living.maker.call(lambda: living.board.frame()["now"]).result(5)
+    assert after["target_rpm"] == pytest.approx(before["target_rpm"], abs=10.0) and living.board.board.get(BRAKE) == living.board.settings[BRAKE] and living.board.state == "CLOSED"
+    assert living.left() == 0
+    rows = list(csv.reader(io.StringIO(living.maker.call(living.board.step).result(5))))
+    assert rows[0] == ["time_s", "measured", "model"] and [float(row[1]) for row in rows[1:]] == told["measured"]
+    assert living.board.loops.hello()["answer"] == told
+
+
+def test_a_speed_step_that_ends_early_gives_the_command_back_and_s2_still_stops_the_motor(living, monkeypatch):
+    living.turning()
+    living.do(measure={"step": "speed", "size": 10})
+    until(lambda: living.loops.steps.told["said"].startswith("1 of"), lambda: str(living.loops.steps.told), 30.0)
+    living.do(measure="cancel")
+    living.measured()
+    assert living.loops.steps.told["said"] == "cancelled" and living.loops.steps.told["figures"] is None and living.board.state == "CLOSED"
+    living.do(measure={"step": "speed", "size": 10})
+    until(lambda: living.loops.steps.told["said"].startswith("1 of"), lambda: str(living.loops.steps.told), 30.0)
+    living.click_s2()
+    living.measured()
+    assert "the motor has left CLOSED" in living.loops.steps.told["said"]
+    living.state("STOPPED")
+    living.turning()
+    monkeypatch.setattr(living.loops, "params", {**living.loops.params, "MAXIMUM_SPEED_RPM": 1800.0})
+    living.do(measure={"step": "speed", "size": 30})
+    living.measured()
+    assert living.loops.steps.told["said"].startswith("the step goes beyond MAXIMUM_SPEED_RPM, 1800") and living.board.state == "CLOSED"
 
 
 def test_cancel_ends_the_sine_and_what_was_measured_stays(living):
@@ -188,7 +240,7 @@ def test_a_sine_that_ends_before_its_record_is_no_point(living, monkeypatch):
 def test_a_firmware_without_the_sine_has_no_such_panel():
     made = recorder_parts()
     item = VirtualBoard(made.library, Origin(made.motor, made.board, ["SCOPE=0"], {}), Symbols.read(made.symbols))
-    assert item.loops is None and item.hello()["loops"] is None and item.frame()["unmeasured"] is None
+    assert item.loops is None and item.hello()["loops"] is None and item.frame()["measurable"] is None
     refusal(lambda: item.act({"measure": "speed"}), "no such command")
     refusal(item.loop, "the firmware has no sine")
 
@@ -198,7 +250,9 @@ def test_a_firmware_without_the_sine_has_no_such_panel():
     (["OPEN_LOOP_FUNCTIONING"], "RAMP", False, True), (["OPEN_LOOP_FUNCTIONING=1"], "ALIGN", False, False), (["TORQUE_MODE"], "CLOSED", False, True)])
 def test_which_loop_can_be_measured_in_which_state_and_mode(modes, state, speed, current):
     loops = LoopResponse(known(), parts().library.params, None, modes, time.monotonic)
-    assert {loop: why is None for loop, why in loops.refusals(state).items()} == {"speed": speed, "current": current}
+    can = {name for name, why in loops.refusals(state).items() if why is None}
+    assert can == {name for name, it_can in (("speed", speed), ("step speed", speed), ("current", current), ("step current", current)) if it_can}
+    assert loops.refusals("CLOSED")["step load"].startswith("TORQUE_MODE has no" if "TORQUE_MODE" in modes else "a load step needs the virtual motor's brake")
 
 
 def test_the_current_loop_with_the_forced_angle_has_the_margin_of_the_model():
@@ -248,7 +302,10 @@ def test_the_models_gains_are_those_of_the_parameters_that_are_variables():
 SAID = "document.getElementById('loops-said').textContent"
 WHOLE = """(() => { const line = Array.from({ length: 80 }, (_, n) => [2.4 * 42 ** (n / 79), 30 - 45 * n / 79, -150 - 0.9 * Math.abs(n - 40)]);
     const points = Array.from({ length: 25 }, (_, n) => { const [hz, db, deg] = line[3 * n + 1]; return [hz, db + 0.5, deg + 362, db, deg, 0.02]; });
-    views.loops.set({ loop: "%s", running: false, done: 25, of: 25, said: "25 points measured", speed_rpm: 1474, line, points, note: "%s",
+    const times = Array.from({ length: 200 }, (_, n) => n * 3 - 60), curve = times.map((ms) => ms < 0 ? 0 : 1 - Math.exp(-ms / 30) * Math.cos(ms / 40));
+    const answer = { step: "speed", said: "mean of 8 steps", note: "A note of the step.", caption: "Step of the speed, 147 rpm at 1474 rpm", time_ms: times, measured: curve, model: curve.map((v) => v * 0.98),
+        figures: { measured: { rise_s: 0.0287, peak: 0.0148, settled_s: 0.0338 }, model: { rise_s: 0.0284, peak: -0.0001, settled_s: null } }, ripple: 0.0052 };
+    views.loops.set({ answer, loop: "%s", running: false, done: 25, of: 25, said: "25 points measured", speed_rpm: 1474, line, points, note: "%s",
         margins: { measured: [55.8, 24.8], model: [51.3, 24.7], difference: 4.5, within: 3 } }); })()""" % ("current", FOLLOWS)
 
 
@@ -270,7 +327,7 @@ def test_the_keyboard_alone_measures_and_cancels_and_the_curve_grows(page, chrom
     resized(page, 1280)
     page.state("STOPPED")
     page.wait("return document.getElementById('measure-speed').disabled && document.getElementById('measure-cancel').disabled", "it can be measured at rest")
-    assert page.text("#loops-why") == "a loop is measured while the motor turns, in CLOSED" and not page.one("#loops-result").is_displayed()
+    assert page.text("#loops-why") == "loops and steps are measured while the motor turns, in CLOSED" and not page.one("#loops-result").is_displayed()
     page.slide("load.constant_nm", 0.03)
     inside(page, "link.send({ set: ['input.pot', 0.5] })")
     page.click("[data-button=S2]")

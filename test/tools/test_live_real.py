@@ -11,7 +11,7 @@ from live_support import Living, known, parts, until
 from support import command, refusal, refused
 
 from tools.bench.scenario import BRAKE
-from tools.live import symbols
+from tools.live import step, symbols
 from tools.live.__main__ import main
 from tools.live.line import Line
 from tools.live.lnet import connect
@@ -132,12 +132,12 @@ def test_the_record_of_a_fault_comes_over_the_same_line(desk):
     until(lambda: desk.frame()["fault"] == "NONE", "not cleared")
 
 
-def test_a_loop_is_measured_while_the_watch_and_the_lease_go_on_and_ends_with_the_motor(desk):
+def test_a_loop_and_a_step_are_measured_while_the_watch_and_the_lease_go_on_and_end_with_the_motor(desk, monkeypatch):
     loops = desk.page.loops
     loops.count, loops.rounds = 4, 1
     desk.do(set=[BRAKE, 0.4 * desk.board.rated.rated_torque_nm])
     desk.state("STOPPED")
-    refusal(lambda: desk.page.act({"measure": "speed"}), "a loop is measured while the motor turns")
+    refusal(lambda: desk.page.act({"measure": "speed"}), "loops and steps are measured while the motor turns")
     desk.page.act({"start": 1500.0}, "a tab")
     desk.state("CLOSED")
     desk.page.act({"measure": "speed"})
@@ -146,14 +146,23 @@ def test_a_loop_is_measured_while_the_watch_and_the_lease_go_on_and_ends_with_th
     assert loops.told["done"] == loops.told["of"] == 4 and loops.told["margins"]["measured"][1] is not None, loops.told
     assert {frame["state"] for frame in frames} == {"CLOSED"} and not any(frame["silent"] for frame in frames)
     assert max(frame["now"]["lease_ms"] for frame in frames) <= LEASE_MS and len({frame["now"]["angle_deg"] for frame in frames}) > 20
-    assert frames[0]["unmeasured"]["current"] == "the speed loop is being measured" and desk.page.loop().startswith("hz,measured_db,")
+    assert frames[0]["measurable"]["why"]["current"] == "the speed loop is being measured" and desk.page.loop().startswith("hz,measured_db,")
+    monkeypatch.setattr(step, "RECORDS", 1)
+    refusal(lambda: desk.page.act({"measure": {"step": "load", "size": 40}}), "a load step needs the virtual motor's brake")
+    desk.page.act({"measure": {"step": "speed", "size": 10}})
+    refusal(lambda: desk.page.act({"target": 1600.0}), "a step of the speed is being measured")
+    frames = []
+    until(lambda: (frames.append(desk.frame()), not loops.told["running"])[1], lambda: str(loops.steps.told), 60.0)
+    assert loops.steps.told["figures"]["measured"]["rise_s"] == pytest.approx(loops.steps.told["figures"]["model"]["rise_s"], rel=0.3), loops.steps.told
+    assert {frame["state"] for frame in frames} == {"CLOSED"} and max(frame["now"]["target_rpm"] for frame in frames) == pytest.approx(1650.0, abs=20.0)
+    until(lambda: desk.frame()["now"]["target_rpm"] == pytest.approx(1500.0, abs=2.0), "the target does not come back")
     desk.page.act({"measure": "speed"})
     until(lambda: (desk.frame(), loops.told["done"])[1], "no point", 30.0)
     desk.pace(0.0001)
     until(lambda: (desk.frame(), not loops.told["running"])[1], "it does not end", 30.0)
     assert loops.told["said"].startswith("no connection: no answer to service") and loops.told["said"].endswith("; 1 of 4 points measured")
     desk.pace(1.0)
-    until(lambda: not desk.frame()["silent"] and desk.frame()["unmeasured"]["speed"] is None, "it does not come back", 30.0)
+    until(lambda: not desk.frame()["silent"] and desk.frame()["measurable"]["why"]["speed"] is None, "it does not come back", 30.0)
     desk.page.act({"measure": "speed"})
     until(lambda: (desk.frame(), loops.told["done"])[1], "no point", 30.0)
     desk.page.left("a tab")

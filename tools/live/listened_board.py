@@ -124,7 +124,7 @@ class ListenedBoard(AtPort):
         reasons = [] if silent or self.said is None else self.said["limits"]
         return {"t": round(self.time_s, 3), "run": 1, "state": "" if silent else self.state, "fault": self.fault or "NONE", "limits": reasons,
                 "now": None, "outputs": 63 if self.state in view.ON and not silent else 0, "strip": new, "orbit": {"v": [], "i": []}, "log": self.news(),
-                "kept": None, "unmeasured": None, "remote": None, "silent": silent}
+                "kept": None, "measurable": None, "remote": None, "silent": silent}
 
     def _line(self, line: str) -> list[Any] | None:
         """A status line is a row of the curves; another one is told as it is, but for the recorder's."""
@@ -152,3 +152,7 @@ class ListenedBoard(AtPort):
     def loop(self) -> str:
         """It measures none."""
         raise UserError("no loop was measured", "page", TELLS)
+
+    def step(self) -> str:
+        """Nor a step."""
+        raise UserError("no step was measured", "page", TELLS)

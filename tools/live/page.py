@@ -5,7 +5,7 @@ from pathlib import Path
 from tools.bench import page as bench_page
 
 HERE = Path(__file__).parent / "page"
-SCRIPTS = ("link", "board", "bench", "drive", "rotor", "planes", "strips", "measure", "traces", "scope", "remote", "kept", "loops", "tuning", "main")
+SCRIPTS = ("link", "board", "bench", "drive", "rotor", "planes", "strips", "measure", "traces", "scope", "remote", "kept", "step", "loops", "tuning", "main")
 """In this order; each is one matter."""
 
 

@@ -48,6 +48,12 @@ class RealBoard(AtPort):
         self.watch = Watch(symbols, params)
         self.kept, self.tuning = Kept.of(symbols), tuning
         self.loops = LoopResponse.of(symbols, params, motor, modes, time.monotonic)
+        self.aimed_erpm: int | None = None
+        """the target that a step of the speed means instead of the slider's"""
+        if self.loops is not None:
+            self.loops.override = self._override
+            if tuning is not None:
+                self.loops.changed = tuning.on_board
         self.values: dict[str, float] | None = None
         self.scope: Scope | None = None
         self.remote: Remote | None = None
@@ -108,7 +114,7 @@ class RealBoard(AtPort):
         remote.renew_at_s = now_s + RENEW_S
         if not remote.taken:
             self._write(link, "run", 0) # a start is a change, and an older 1 may still stand there
-        self._write(link, "target_erpm", round(remote.target_rpm / self.params["COUNT_SPEED_RPM"]))
+        self._write(link, "target_erpm", round(remote.target_rpm / self.params["COUNT_SPEED_RPM"]) if self.aimed_erpm is None else self.aimed_erpm)
         self._write(link, "lease_ms", LEASE_MS)
         if not remote.taken: # once: after S2 it must stay the panel's
             self._write(link, "mode", TARGET_MODE)
@@ -116,6 +122,9 @@ class RealBoard(AtPort):
             self._write(link, "run", int(remote.run))
             remote.sent_run = remote.run
         self.values, remote.taken = self.watch.read(link), True
+
+    def _override(self, erpm: int | None) -> None:
+        self.aimed_erpm = erpm
 
     def _write(self, link: lnet.Lnet, member: str, value: int) -> None:
         variable = self.symbols.find(f"scope_command.{member}")
@@ -144,6 +153,8 @@ class RealBoard(AtPort):
 
     def _wish(self, starts: bool, target_rpm: float, who: Any) -> None:
         remote = self.remote
+        if self.loops is not None and self.loops.borrows:
+            raise UserError("a step of the speed is being measured", "page", "wait, or cancel it")
         if starts:
             self.remote, self.driver = Remote(True, target_rpm), who
             self.note(f"start, {target_rpm:.0f} rpm")
@@ -167,7 +178,7 @@ class RealBoard(AtPort):
         """All that a new tab must know."""
         low, high = self._range()
         return self.about(self.params) | {
-            "remote": {"low": low, "high": high}, "panels": view.panels(False), "kept": self.kept is not None, "loops": self.loops and self.loops.told,
+            "remote": {"low": low, "high": high}, "panels": view.panels(False), "kept": self.kept is not None, "loops": self.loops and self.loops.hello(),
             "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "scope": self.scope.hello() if self.scope else None}
 
     def frame(self) -> dict[str, Any]:
@@ -187,7 +198,7 @@ class RealBoard(AtPort):
                 "limits": self.limits(int(values["limits"]) if values else 0),
                 "now": {name: round(value, 4) for name, value in values.items()} if values else None, "outputs": 63 if self.state in view.ON and not silent else 0,
                 "strip": new, "orbit": self._vectors(values), "log": self.news(),
-                "kept": self.kept.told() if self.kept else None, "unmeasured": self.loops and self.loops.refusals("" if silent else self.state),
+                "kept": self.kept.told() if self.kept else None, "measurable": self.loops and self.loops.frame("" if silent else self.state),
                 "remote": None if self.remote is None else {"run": self.remote.run, "target_rpm": self.remote.target_rpm},
                 "silent": silent}
 
@@ -221,4 +232,8 @@ class RealBoard(AtPort):
 
     def loop(self) -> str:
         """The loop that was measured last."""
-        return measured_loop(self.loops)
+        return measured_loop(self.loops).csv()
+
+    def step(self) -> str:
+        """The step that was measured last."""
+        return measured_loop(self.loops).steps.csv()

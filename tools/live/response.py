@@ -40,7 +40,9 @@ SPARE_S = 2.0
 """That the sine lasts beyond a record: the link has other work, too."""
 LONGEST_S = 3.0
 """Of a record: the lease of scope_command holds 5 s."""
-LEASE_MS, TARGET_MODE = 5000, 1
+LEASE_MS, RENEW_S = 5000, 1.0
+PANEL_MODE, TARGET_MODE = 0, 1
+"""Of scope_command."""
 POLL_S, LOOK_S, STEADY_S = 0.02, 0.1, 1.0
 RUN = "board_drive.run"
 SINE = f"{RUN}.sine"
@@ -94,6 +96,8 @@ class Bench:
         """of a step of the load observer, and of the sine's `left`"""
         self.turning, self.hz = "", 0.0
         """the state that the motor must not leave, and the frequency that is measured"""
+        self.leases = False
+        """the scope's command holds only as long as its lease is renewed"""
         if not has_sine(firmware.symbols):
             raise UserError("the firmware has no sine for its loops", "response", "build it with SCOPE 1")
 
@@ -108,8 +112,20 @@ class Bench:
 
     # ---- the motor ----------------------------------------------------------------------------------------------------------
     def pause(self, seconds: float) -> None:
-        """Lets time pass."""
-        self._pause(seconds)
+        """Lets time pass; a lease is renewed."""
+        while seconds > 0.0:
+            if self.leases:
+                self.hold()
+            self._pause(min(seconds, RENEW_S))
+            seconds -= RENEW_S
+
+    def hold(self) -> None:
+        """Renews the lease."""
+        self.firmware.put("scope_command.lease_ms", LEASE_MS)
+
+    def aim(self, erpm: int) -> None:
+        """Another target for the motor, of the client that has the command."""
+        self.firmware.put("scope_command.target_erpm", erpm)
 
     def end(self) -> None:
         """No sine any more."""
@@ -224,6 +240,7 @@ class Driven(Bench):
         put, steady = self.firmware.put, 0
         put("scope_command.run", 0)
         put("scope_command.target_erpm", round(speed_rpm / self.params["COUNT_SPEED_RPM"]))
+        self.leases = True
         self.hold()
         put("scope_command.mode", TARGET_MODE)
         put("scope_command.run", 1)
@@ -240,19 +257,9 @@ class Driven(Bench):
                 return
         raise UserError(f"the motor has {self.speed_rpm():.0f} rpm instead of {speed_rpm:g} after {within_s:g} s", "response", "name a speed that it reaches")
 
-    def hold(self) -> None:
-        """Renews the lease."""
-        self.firmware.put("scope_command.lease_ms", LEASE_MS)
-
-    def pause(self, seconds: float) -> None:
-        """Lets time pass; the lease is renewed."""
-        while seconds > 0.0:
-            self.hold()
-            super().pause(min(seconds, 1.0))
-            seconds -= 1.0
-
     def stop(self) -> None:
         """No sine, and the motor stops."""
+        self.leases = False
         self.end()
         self.firmware.put("scope_command.run", 0)
 

@@ -26,7 +26,8 @@ from tuning import loops
 from . import board as live_board
 from . import lnet, response, step
 from .response import Bench, Driven, Firmware, Point
-from .response_model import COLUMNS, WITHIN_DEG, Result, gains_of, model_of, plants
+from .response_model import COLUMNS, WITHIN_DEG, Result, model_of
+from .step_model import answer, answers_of, seconds_of
 from .symbols import Symbols
 
 OPEN_LOOP = "-DOPEN_LOOP_FUNCTIONING"
@@ -35,30 +36,6 @@ SPEED_SHARE, LOAD_SHARE = 0.5, 0.4
 SETTLE_S = 2.0
 ANSWER_S = 20.0
 """The simulated chip takes its time."""
-CURRENT_STEPS, SPEED_STEPS = 2048, 16384
-"""Of the model's answers, until all has died away."""
-STEP_BANDWIDTHS = 8.0
-"""A speed's record, over its bandwidth."""
-
-
-# ---- the tuner's model of a step, with what the firmware uses at this moment ------------------------------------------------
-
-def answers_of(name: str, bench: Bench, motor: motor_file.Motor | None, load_nm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Times since a step, and what the model answers."""
-    period_s = bench.period_s
-    if name == "current":
-        hz = np.arange(1, CURRENT_STEPS // 2 + 1) / CURRENT_STEPS / period_s
-        loop = model_of("current", bench, motor)(hz)
-        return np.arange(CURRENT_STEPS) * period_s, step.answer_of(np.concatenate([[1.0], loop / (1.0 + loop)]))
-    true, header = plants(bench.params, motor)
-    slow_s, omega_e = bench.slow_s, abs(bench.speed_rpm()) * bench.params["NOPOLESPAIRS"] * np.pi / 30.0
-    hz = np.arange(1, SPEED_STEPS // 2 + 1) / SPEED_STEPS / slow_s
-    base = gains_of(bench)
-    if name == "load": # the innovation's gate opens
-        base = loops.speed_gains(header, bench.params["SPEED_BANDWIDTH_HZ"], bench.params["LOAD_BANDWIDTH_HZ"], base, omega_e)["quick"]
-    reference, torque = loops.SpeedLoops(hz, header).closed(true, base, omega_e)
-    closed = np.concatenate([[1.0], reference]) if name == "speed" else np.concatenate([[0.0], torque * load_nm / omega_e])
-    return np.arange(SPEED_STEPS) * slow_s, step.answer_of(closed)
 
 
 # ---- boards ------------------------------------------------------------------------------------------------------------------
@@ -137,19 +114,14 @@ def _answers(place: Place, loop: str, load_nm: float | None) -> list[step.Answer
     """The steps that go with a loop; that of the load is the virtual board's brake."""
     bench, motor, board = place.bench, place.motor, place.board
     if loop == "current":
-        return [_answer("current", *step.current(bench), *answers_of("current", bench, motor, 0.0))]
-    seconds = STEP_BANDWIDTHS / bench.params["SPEED_BANDWIDTH_HZ"]
-    expected = answers_of("speed", bench, motor, 0.0)
-    found = [_answer("speed", *step.speed(bench, seconds), *expected)]
+        return [answer("current", step.current(bench), answers_of("current", bench, motor))]
+    seconds, expected = seconds_of(bench), answers_of("speed", bench, motor)
+    found = [answer("speed", step.speed(bench, seconds), expected)]
     if board is not None and load_nm is not None:
         board.set(BRAKE, 0.0)
         bench.pause(SETTLE_S)
-        found.append(_answer("load", *step.load(bench, seconds, lambda on: board.set(BRAKE, load_nm if on else 0.0)), *answers_of("load", bench, motor, load_nm)))
+        found.append(answer("load", step.load(bench, seconds, lambda on: board.set(BRAKE, load_nm if on else 0.0)), answers_of("load", bench, motor, load_nm)))
     return found
-
-
-def _answer(name: str, time_s: np.ndarray, values: np.ndarray, model_s: np.ndarray, model: np.ndarray) -> step.Answer:
-    return step.Answer(name, time_s, values, np.interp(time_s, model_s, model, left=0.0))
 
 
 def text(results: list[Result], answers: list[step.Answer], title: str) -> str:
@@ -159,8 +131,8 @@ def text(results: list[Result], answers: list[step.Answer], title: str) -> str:
         load = "" if item.load_nm is None else f"{item.load_nm:.3g} N m"
         lines.append(f"{item.loop:8}{item.speed_rpm:6.0f} rpm  {load:9}  {_margin(item.measured):23}  {_margin(item.expected):23}  {item.difference_deg:+.1f} degrees"
                      + ("" if item.holds else f"  ! more than {WITHIN_DEG:g}"))
-    lines += ["", "step        measured: rise / overshoot, of a load dip / settled     tuner's model"]
-    lines += [f"{item.step:10}  {_figures(item, item.measured):50}  {_figures(item, item.expected)}" for item in answers]
+    lines += ["", "step        measured: rise / overshoot, of a load dip / settled     tuner's model                     ripple before the step"]
+    lines += [f"{item.step:10}  {_figures(item, item.measured):50}  {_figures(item, item.expected):32}  {item.ripple:.1%} rms" for item in answers]
     return "\n".join(lines)
 
 
@@ -170,17 +142,17 @@ def _figures(answer: step.Answer, values: np.ndarray) -> str:
     return f"{rise} / {max(found.peak, 0.0):.1%} / " + ("not in the record" if found.settled_s is None else f"{found.settled_s * 1e3:.3g} ms")
 
 
-def write_answer(folder: Path, answer: step.Answer, title: str) -> None:
+def write_answer(folder: Path, found: step.Answer, title: str) -> None:
     """Plot and numbers of a step."""
-    output.write_csv(folder / f"step_{answer.step}.csv", ["time_s", "measured", "model"],
-                     [[f"{number:.6g}" for number in row] for row in zip(answer.time_s, answer.measured, answer.expected)])
+    output.write_csv(folder / f"step_{found.step}.csv", ["time_s", "measured", "model"],
+                     [[f"{number:.6g}" for number in row] for row in zip(found.time_s, found.measured, found.expected)])
     figure, axes = plt.subplots(figsize=(8, 3.6), layout="constrained")
-    for values, colour, label in ((answer.expected, "tab:blue", "tuner's model"), (answer.measured, "tab:orange", "measured")):
-        axes.plot(answer.time_s * 1e3, values, color=colour, label=f"{label}: {_figures(answer, values)}")
-    axes.set(title=f"{title}: step of the {answer.step}", xlabel="time since the step [ms]",
-             ylabel="change of the speed, of the speed" if answer.step == "load" else "change, of the step")
+    for values, colour, label in ((found.expected, "tab:blue", "tuner's model"), (found.measured, "tab:orange", "measured")):
+        axes.plot(found.time_s * 1e3, values, color=colour, label=f"{label}: {_figures(found, values)}")
+    axes.set(title=f"{title}: step of the {found.step}", xlabel="time since the step [ms]",
+             ylabel="change of the speed, of the speed" if found.step == "load" else "change, of the step")
     axes.legend()
-    saved(figure, folder, f"step_{answer.step}")
+    saved(figure, folder, f"step_{found.step}")
 
 
 def _margin(margins: loops.Margins) -> str:
@@ -210,7 +182,7 @@ def _summary(results: list[Result], answers: list[step.Answer], place: Place) ->
     rows = [{"loop": item.loop, "speed_rpm": item.speed_rpm, "load_nm": item.load_nm, "measured_deg": item.measured.phase_deg, "measured_hz": item.measured.crossover_hz,
              "model_deg": item.expected.phase_deg, "model_hz": item.expected.crossover_hz, "ok": item.holds} for item in results]
     steps = [{"step": item.step, "measured": vars(step.figures(item.step, item.time_s, item.measured)),
-              "model": vars(step.figures(item.step, item.time_s, item.expected))} for item in answers]
+              "model": vars(step.figures(item.step, item.time_s, item.expected)), "ripple": item.ripple} for item in answers]
     return clean({"title": place.title, "motor": place.path, "rows": rows, "steps": steps, "passed": all(item.holds for item in results),
                   "expectations": [{"name": f"{item.loop} loop's phase margin is the model's", "ok": item.holds} for item in results]})
 

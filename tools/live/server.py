@@ -19,7 +19,7 @@ from .pace import PACES, Pacemaker
 ADDRESS = "127.0.0.1"
 NAMES = (ADDRESS, "localhost")
 USUAL_PORT = 8033
-AHEAD = 2
+AHEAD = 4
 """Messages that a tab may have without having said that it has shown them; what comes meanwhile is joined to one frame."""
 MOST_ROWS, MOST_LINES = 2000, 200
 """Of curves and log in such a frame."""
@@ -29,7 +29,7 @@ UNSAFE = r"[^A-Za-z0-9_.-]"
 MOTOR = "motor"
 """To be saved, too: its name is the motor's own."""
 SAVED = {"scenario": ("recorded.toml", "application/toml"), "csv": ("recorded.csv", "text/csv"), "header": ("userparams.h", "text/x-c"),
-         "loop": ("loop.csv", "text/csv")}
+         "loop": ("loop.csv", "text/csv"), "step": ("step.csv", "text/csv")}
 
 
 class Tab:

@@ -304,6 +304,10 @@ class Tuning:
         return {"changed": {name: {"text": text, "place": place} for name, (text, place) in self.changed.items()}, "undo": len(self.before),
                 "lost": self.lost, "foreign": self.foreign or 0}
 
+    def on_board(self) -> dict[str, int]:
+        """Members of board_params that are not the header's, and whether the board has lost them."""
+        return dict(self.wanted) | ({"lost": 1} if self.lost else {})
+
     def saved(self) -> bytes:
         """The header with the changed values, else to the last byte as its file is."""
         return _bytes(with_values(self.header, {name: text for name, (text, _) in self.changed.items()}))

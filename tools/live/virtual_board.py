@@ -28,7 +28,7 @@ from .scope import Scope
 from .symbols import Symbols
 from .tuning import FIXED, Tuning, tuned
 
-SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm", "fw.profile_a", "plant.torque_mean_nm"]
+SIGNALS = [*simulate.SIGNALS, "fw.theta_ctrl_deg", "fw.speed_target_rpm", "fw.profile_a", "plant.torque_mean_nm", "plant.i_d_mean", "plant.i_q_mean"]
 FIRST_S = 0.01
 """What passes at power-up before anybody can act."""
 RECORDED_ROW_S = 0.001
@@ -58,7 +58,11 @@ class VirtualBoard:
         self.settings = {key: row["start"] for key, row in self.sliders.items()}
         self.faults: list[str] = []
         self.held: dict[str, set[Any]] = {button: set() for button in BUTTONS.values()}
-        self.loops = LoopResponse.of(symbols, library.params, self.rated, origin.defines, lambda: self.time_s)
+        self.braked: deque[float] = deque()
+        """loads beside the slider's, of a step that the scope's thread measures"""
+        self.loops = LoopResponse.of(symbols, library.params, self.rated, origin.defines, lambda: self.time_s, self.braked.append)
+        if self.loops is not None and self.tuning is not None:
+            self.loops.changed = self.tuning.on_board
         self.board: Board | None = None
         self.runs = 0
         self.power_up()
@@ -130,11 +134,10 @@ class VirtualBoard:
         self.recent: list[Trace] = []
         self.recent_rows = 0
         """those that no frame has shown"""
-        self.begun: Trace | None = None
-        """the curves' row that is not whole yet"""
+        self.undrawn: list[Trace] = []
+        """what no row of the curves has"""
         self.line.clear()
         self.strip: deque[list[float]] = deque(maxlen=round(view.STRIP_S / view.STRIP_ROW_S))
-        self.new_strip: list[list[float]] = []
         self.state, self.fault = "", "NONE"
         self.note("power-up")
         self.run(FIRST_S)
@@ -142,6 +145,8 @@ class VirtualBoard:
     def run(self, seconds: float) -> None:
         """Lets this much motor time pass, a period at least."""
         end_s = self.time_s + seconds
+        while self.braked:
+            self._set({BRAKE: self.settings[BRAKE] + self.braked.popleft()})
         for button, at_s in sorted(self.releases.items(), key=lambda item: item[1]):
             if at_s < end_s:
                 self._pass(at_s - self.time_s)
@@ -175,9 +180,9 @@ class VirtualBoard:
 
     def _recorded(self, trace: Trace) -> None:
         self.recent.append(trace)
+        self.undrawn.append(trace)
         self._note_changes(trace, "fw.state", self.library.states, self._note_state)
         self._note_changes(trace, "fw.fault", self.library.faults, self._note_fault)
-        self._draw(trace)
         every = round(RECORDED_ROW_S / self.period_s)
         first = -self.rows_seen % every
         if len(trace) > first:
@@ -185,13 +190,14 @@ class VirtualBoard:
         self.rows_seen += len(trace)
         self.recent_rows += len(trace)
 
-    def _draw(self, trace: Trace) -> None:
-        """More of the curves."""
+    def _drawn(self) -> list[list[float | None]]:
+        """More rows of the curves, of what is whole."""
         every = round(view.STRIP_ROW_S / self.period_s)
-        whole = _joined([self.begun, trace] if self.begun else [trace])
-        self.new_strip += view.strip(whole, every, self.library.states)
+        whole = _joined(self.undrawn)
+        found = view.strip(whole, every, self.library.states)
         rest = len(whole) - len(whole) % every
-        self.begun = Trace(SIGNALS, whole.time_s[rest:], whole.data[:, rest:])
+        self.undrawn = [Trace(SIGNALS, whole.time_s[rest:], whole.data[:, rest:])]
+        return found
 
     @staticmethod
     def _note_changes(trace: Trace, signal: str, names: dict[int, str], note: Any) -> None:
@@ -214,7 +220,7 @@ class VirtualBoard:
     # ---- what somebody does ----------------------------------------------------------------------------------------------
     def act(self, command: Any, who: Any = None) -> None:
         """One of {"press": "S2"}, {"release": "S2"}, {"set": [key, value]}, {"fault": [name, true]}, {"power": true}, {"keep": true},
-        {"forget": true}, {"measure": "speed"}."""
+        {"forget": true}, {"measure": "speed"}, {"measure": {"step": "load", "size": 40}}."""
         work = {"press": self._press, "release": self._let_go, "set": self._turn, "fault": self._break, "power": lambda value, who: self.power_up()}
         if self.kept is not None:
             work |= {name: lambda value, who, request=name.upper(): self.kept.ask(request) for name in ("keep", "forget")}
@@ -306,7 +312,9 @@ class VirtualBoard:
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),
                 "throws": [{"name": fault.name, "label": fault.label, "group": fault.kind.partition(":")[0]} for fault in FAULTS.values()],
                 "states": view.states(), "estimates": view.ESTIMATES, "faults": view.faults(), "limits": view.limits(),
-                "panels": view.panels(True), "kept": self.kept is not None, "loops": self.loops and self.loops.told, "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log), "scope": self.scope.hello() if self.scope else None,
+                "panels": view.panels(True), "kept": self.kept is not None, "loops": self.loops and self.loops.hello(),
+                "tuning": self.tuning.hello() if self.tuning else {"fixed": FIXED}, "strip": list(self.strip), "log": list(self.log),
+                "scope": self.scope.hello() if self.scope else None,
                 "recorder": self.records and self.records.hello(self.symbols or Symbols({}))}
 
     def frame(self) -> dict[str, Any]:
@@ -315,7 +323,7 @@ class VirtualBoard:
             while part is not None and part.news:
                 self.note(part.news.popleft(), kind="action")
         told, self.told = self.told, self.lines
-        new, self.new_strip = self.new_strip, []
+        new = self._drawn()
         self.strip.extend(new)
         trace, rows = _joined(self.recent), self.recent_rows or len(self.recent[-1])
         self.recent, self.recent_rows = self.recent[-1:], 0 # where nothing passes until the next frame, it shows the last moment again
@@ -323,7 +331,7 @@ class VirtualBoard:
         return {"t": round(self.time_s, 4), "state": self.state, "fault": self.fault,
                 "limits": [row.name for row in drive_tables.limits() if row.code & reasons],
                 "now": view.now(trace, rows) | {"power_w": round(self.board.get("bus.voltage_v") * self.board.get("bus.current_a"), 3)},
-                "kept": self.kept.told() if self.kept else None, "unmeasured": self.loops and self.loops.refusals(self.state),
+                "kept": self.kept.told() if self.kept else None, "measurable": self.loops and self.loops.frame(self.state),
                 "outputs": int(self.board.get("pwm.outputs_seen")),
                 "leds": {name: int(self.board.get("pin." + pins.firmware()[f"led_{name}"].pin)) for name in ("alive", "run")},
                 "settings": self.settings, "run": self.runs,
@@ -345,7 +353,11 @@ class VirtualBoard:
 
     def loop(self) -> str:
         """The loop that was measured last."""
-        return measured_loop(self.loops)
+        return measured_loop(self.loops).csv()
+
+    def step(self) -> str:
+        """The step that was measured last."""
+        return measured_loop(self.loops).steps.csv()
 
     def csv(self) -> str:
         """The trace since power-up, at most that of the last two minutes."""

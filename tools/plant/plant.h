@@ -35,8 +35,8 @@ typedef struct {
     double id, iq, theta, c, s, omega;
     double turns; /* mechanical revolutions since creation */
     /* integrals over the period */
-    double torque_nms, vd_vs, vq_vs, copper_j;
-    double torque_nm, vd_v, vq_v, copper_w; /* means of the last period */
+    double torque_nms, vd_vs, vq_vs, id_as, iq_as, copper_j;
+    double torque_nm, vd_v, vq_v, id_a, iq_a, copper_w; /* means of the last period */
     bool derived_stale;
 } plant_motor_t;
 

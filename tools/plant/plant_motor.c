@@ -141,6 +141,8 @@ void plant_motor_mechanics(plant_motor_t *m, double h_s)
     double between_nm = 1.5 * m->torque_nm - 0.5 * before_nm;
     m->vd_v = m->vd_vs / h_s;
     m->vq_v = m->vq_vs / h_s;
+    m->id_a = m->id_as / h_s;
+    m->iq_a = m->iq_as / h_s;
     m->copper_w = m->copper_j / h_s;
     m->theta = plant_wrap(m->theta + m->omega * h_s, 2.0 * PLANT_PI);
     m->c = cos(m->theta);
@@ -152,5 +154,7 @@ void plant_motor_mechanics(plant_motor_t *m, double h_s)
     m->torque_nms = 0.0;
     m->vd_vs = 0.0;
     m->vq_vs = 0.0;
+    m->id_as = 0.0;
+    m->iq_as = 0.0;
     m->copper_j = 0.0;
 }

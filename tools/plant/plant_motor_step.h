@@ -8,12 +8,12 @@
 
 /* What a step changes, to take it back. */
 typedef struct {
-    double id, iq, c, s, torque_nms, vd_vs, vq_vs, copper_j;
+    double id, iq, c, s, torque_nms, vd_vs, vq_vs, id_as, iq_as, copper_j;
 } plant_motor_state_t;
 
 static inline plant_motor_state_t plant_motor_save(const plant_motor_t *m)
 {
-    return (plant_motor_state_t){m->id, m->iq, m->c, m->s, m->torque_nms, m->vd_vs, m->vq_vs, m->copper_j};
+    return (plant_motor_state_t){m->id, m->iq, m->c, m->s, m->torque_nms, m->vd_vs, m->vq_vs, m->id_as, m->iq_as, m->copper_j};
 }
 
 static inline void plant_motor_restore(plant_motor_t *m, const plant_motor_state_t *state)
@@ -25,6 +25,8 @@ static inline void plant_motor_restore(plant_motor_t *m, const plant_motor_state
     m->torque_nms = state->torque_nms;
     m->vd_vs = state->vd_vs;
     m->vq_vs = state->vq_vs;
+    m->id_as = state->id_as;
+    m->iq_as = state->iq_as;
     m->copper_j = state->copper_j;
 }
 
@@ -64,6 +66,8 @@ static inline void plant_motor_step(plant_motor_t *m, double v_alpha, double v_b
     m->copper_j += h_s * 1.5 * m->r * (id * id + iq * iq);
     m->vd_vs += h_s * vd;
     m->vq_vs += h_s * vq;
+    m->id_as += h_s * id;
+    m->iq_as += h_s * iq;
 }
 
 static inline void plant_motor_phase_currents(const plant_motor_t *m, double i[3])

@@ -317,6 +317,8 @@ static const key_entry_t table[] = {
     R("plant.i_c", latch.i_c, "A", "phase current into the motor"),
     R("plant.i_d", latch.i_d, "A", "true d current"),
     R("plant.i_q", latch.i_q, "A", "true q current"),
+    R("plant.i_d_mean", latch.i_d_mean, "A", "true d current, mean of the period before"),
+    R("plant.i_q_mean", latch.i_q_mean, "A", "true q current, mean of the period before"),
     R("plant.theta_e_deg", latch.theta_e_deg, "deg", "electrical angle of the rotor, 0..360"),
     R("plant.speed_rpm", latch.speed_rpm, "rpm", "mechanical speed"),
     R("plant.turns", latch.turns, "rev", "mechanical revolutions since creation"),

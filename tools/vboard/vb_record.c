@@ -21,6 +21,8 @@ void vb_latch(vb_t *vb)
     l->torque_nm = forward * plant_motor_torque(m);
     l->turns = forward * (m->turns + m->omega * vb->plant.now_s / (2.0 * PLANT_PI * m->pole_pairs));
     l->torque_mean_nm = forward * m->torque_nm;
+    l->i_d_mean = m->id_a;
+    l->i_q_mean = forward * m->iq_a;
     l->v_d = m->vd_v;
     l->v_q = forward * m->vq_v;
     vb->trace.due = true;

@@ -83,7 +83,7 @@ typedef struct {
 
 /* Plant quantities at the sampling instant. */
 typedef struct {
-    double time_s, i_a, i_b, i_c, i_d, i_q, theta_e_deg, speed_rpm, torque_nm, torque_mean_nm, turns;
+    double time_s, i_a, i_b, i_c, i_d, i_q, i_d_mean, i_q_mean, theta_e_deg, speed_rpm, torque_nm, torque_mean_nm, turns;
     double v_d, v_q; /* rotor-frame means of the period before */
 } vb_latch_t;
 

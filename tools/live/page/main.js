@@ -81,7 +81,7 @@ addEventListener("resize", () => views?.loops.draw());
 
 by("power").addEventListener("click", () => link.send({ power: true }));
 by("pace").addEventListener("change", () => { paceBusy = performance.now() + 500; link.send({ pace: Number(by("pace").value) }); });
-for (const what of ["scenario", "csv", "header", "motor", "loop"]) {
+for (const what of ["scenario", "csv", "header", "motor", "loop", "step"]) {
   by(`save-${what}`).addEventListener("click", async () => { // what cannot be saved says why, instead of an empty file
     const answer = await fetch(`/save/${what}${location.search}`);
     if (!answer.ok) { warn((await answer.text()).trim()); return; }
