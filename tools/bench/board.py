@@ -1,6 +1,7 @@
 """The virtual board's C library for Python: libvboard.so through ctypes, with its errors as exceptions."""
 
 import ctypes
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -80,12 +81,12 @@ class Library:
         call = getattr(self.c, "probe_param_get", None)
         return call is not None and call(name.encode(), ctypes.byref(ctypes.c_double())) == 0
 
-    @property
+    @cached_property
     def states(self) -> dict[int, str]:
         """Names of the numbers in "fw.state"."""
         return self._names(self.c.vb_state_name)
 
-    @property
+    @cached_property
     def faults(self) -> dict[int, str]:
         """Names of the numbers in "fw.fault"."""
         return self._names(self.c.vb_fault_name)

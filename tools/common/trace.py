@@ -51,8 +51,7 @@ class Trace:
         if not len(self):
             return []
         column = self.column(name)
-        rows = np.concatenate(([0], np.flatnonzero(np.diff(column)) + 1))
-        return [(int(row), float(column[row])) for row in rows]
+        return [(row, float(column[row])) for row in (0, *(np.flatnonzero(column[1:] != column[:-1]) + 1).tolist())]
 
 
 class Recording:

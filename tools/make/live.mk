@@ -1,7 +1,7 @@
 # The virtual board in real time: make live, the page; make live-board, its serial line. Variables: MOTOR BOARD DEFINES USERPARAMS as for
 # `make run`; LOOP SPEED LOAD OUT (make response); PORT ELF (a real board); CPU=33f (the simulated chip, with XC16=folder or IMAGE=file).
 tuned = $(if $(USERPARAMS),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,:))
-.PHONY: live response live-pictures live-board text live-library live-params setup-live setup-scope
+.PHONY: live response live-pictures live-endurance live-board text live-library live-params setup-live setup-scope
 live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= PORT=/dev/ttyUSB0 ELF= KEPT=file]
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) \
@@ -12,6 +12,9 @@ response: setup-scope ## [run] open loops measured over the tuner's model, and s
 	@$(if $(every),,$(alone) $(python) -m tools.live.response_command $(options) $(if $(LOOP),--loop $(call quoted,$(LOOP))) $(if $(SPEED),--speed $(call quoted,$(SPEED))) \
 	    $(if $(LOAD),--load $(call quoted,$(LOAD))) $(if $(CPU),--cpu $(call quoted,$(CPU))) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) \
 	    $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF))))
+
+live-endurance: setup-browser ## [upkeep] ten minutes of make live in Chromium: what the server takes, whether memory grows, frames a second [MINUTES=10 TABS=2]
+	@$(alone) $(python) -m tools.live.endurance $(if $(MINUTES),--minutes $(call quoted,$(MINUTES))) $(if $(TABS),--tabs $(call quoted,$(TABS)))
 
 live-pictures: setup-browser ## [upkeep] write docs/live-*.png: the page of make live in a real browser
 	@$(alone) $(python) -m tools.live.pictures

@@ -60,6 +60,7 @@ class DriveView {
       item.lastChild.textContent = line.text;
     }
     while (list.children.length > 200) { list.lastChild.remove(); }
+    for (const [id, item] of this.lines) { if (!item.isConnected) { this.lines.delete(id); } }
   }
 
   clear() {
