@@ -30,6 +30,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
     parser.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
+    parser.add_argument("--cpu", choices=("host", "33f"), default="host", help="33f: an image of XC16 in the instruction-set simulator")
+    parser.add_argument("--image", type=Path, metavar="FILE", help="such an image (ELF) instead of building one")
     parser.add_argument("--kept", type=Path, metavar="FILE", help="the virtual board's pages of kept parameters: read from this file, and written in the end")
     parser.add_argument("--pace", default="1", help="motor seconds in a second: " + ", ".join(f"{pace:g}" for pace in PACES))
     parser.add_argument("--port", help="serial port of a real board; with SCOPE 1 in its firmware the page can start the motor and has a scope")
@@ -49,8 +51,12 @@ def _live(options: argparse.Namespace) -> int:
     pace, port = _pace(options.pace), _port(options.listen)
     if options.port and options.kept:
         raise UserError("a real board has its own flash", "KEPT", "leave it out")
+    if options.port and (options.cpu != "host" or options.image):
+        raise UserError("a board has its own processor", "CPU", "leave out CPU or PORT")
+    if options.image and options.cpu == "host":
+        raise UserError("an image for the PC's processor", "IMAGE", "add CPU=33f")
     parts = _parts(options)
-    with kept.flash_in(options.kept, parts.library):
+    with kept.flash_in(options.kept, parts.library, parts.image is not None):
         asyncio.run(server.serve(_real(options, parts) if options.port else _virtual(options, parts), port, pace, _tell))
     return 0
 
@@ -80,7 +86,7 @@ def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], 
     origin = Origin(parts.motor, parts.board, with_scope(command_common.macros(options.defines)), words)
     symbols = Symbols.read(parts.symbols)
     tuning = _tuning(options, parts, symbols)
-    return lambda: VirtualBoard(parts.library, origin, symbols, tuning)
+    return lambda: VirtualBoard(parts.library, origin, symbols, tuning, parts.image)
 
 
 def _tuning(options: argparse.Namespace, parts: "board.Parts", symbols: "Symbols") -> "Tuning | None":
@@ -91,14 +97,16 @@ def _tuning(options: argparse.Namespace, parts: "board.Parts", symbols: "Symbols
     folder = command_common.header_for(options)
     header = ((build.header_folder(folder) if folder else None) or paths.ROOT) / build.HEADER
     files = (parts.motor.path, parts.board.path) if options.motor else None
-    return Tuning.of(header, with_scope(command_common.macros(options.defines)), Symbols.read(parts.symbols), symbols, files)
+    macros = with_scope(command_common.macros(options.defines))
+    layout = parts.symbols if parts.image is None else build.library(macros, build.header_folder(folder) if folder else None, "live-library").with_name("foc33.elf")
+    return Tuning.of(header, macros, Symbols.read(layout), symbols, files)
 
 
 def _parts(options: argparse.Namespace) -> "board.Parts":
     """Motor, board and firmware; with --library that one, which its ELF file lies beside."""
     from . import board
     if options.library is None:
-        return board.parts(options.motor, options.board, options.defines, options.userparams)
+        return board.parts(options.motor, options.board, options.defines, options.userparams, options.cpu, options.image)
     motor, board_part = command_common.parts_of(Scenario("live", "", "", MOTOR, "", 0.0), options)
     library = command_common.library_for([], options.library, options.userparams)
     return board.Parts(motor, board_part, library, None, options.library.with_name("foc33.elf"))

@@ -20,7 +20,8 @@ except ImportError:
     pass # program.reading() says so
 
 DSPIC = "EM_DSPIC30F"
-RAM = range(0x0800, 0xF800)
+RAM, RAM_OF_CHIP = range(0x0800, 0xF800), range(0x0800, 0x8000)
+"""Of the PC's firmware, and of an image: what lies beyond is the window to the flash, where constants are, and no client can read it."""
 ADDRESS, PLUS = 0x03, 0x23
 """DW_OP_addr, DW_OP_plus_uconst."""
 SIGNED = (0x05, 0x06, 0x0D)
@@ -67,12 +68,13 @@ class Symbols:
         """The variables of an ELF file of XC16, or of the PC's."""
         with reading("ELF", path):
             found: dict[str, Variable] = {}
+            ram = RAM_OF_CHIP if ELFFile(BytesIO(contents("ELF", path)))["e_machine"] == DSPIC else RAM
             for unit in dwarf_of(path).iter_CUs():
                 for die in unit.iter_DIEs():
                     place = die.attributes.get("DW_AT_location") if die.tag == "DW_TAG_variable" else None
                     if place is not None and isinstance(place.value, (list, bytes)) and len(place.value) > 2 and place.value[0] == ADDRESS:
                         address = int.from_bytes(bytes(place.value[1:]), "little")
-                        if address in RAM:
+                        if address in ram:
                             found |= {item.name: item for item in _numbers(_declared(die), _name(die), address)}
         return Symbols(found)
 

@@ -2,11 +2,12 @@
 
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tools.bench import simulate
+from tools.bench import pil, simulate
 from tools.bench.board import Board, Library
 from tools.bench.panel import HOLD_S
 from tools.bench.scenario import BRAKE, Scenario
@@ -41,8 +42,8 @@ SUPPLY, TEMPERATURE = "supply.voltage_v", "motor.temp_c"
 class VirtualBoard:
     """Between two run() it can be worked at; one thread at a time."""
 
-    def __init__(self, library: Library, origin: Origin, symbols: Symbols | None = None, tuning: Tuning | None = None) -> None:
-        self.library, self.origin = library, origin
+    def __init__(self, library: Library, origin: Origin, symbols: Symbols | None = None, tuning: Tuning | None = None, image: Path | None = None) -> None:
+        self.library, self.origin, self.image = library, origin, image
         self.line = Line()
         self.scope: Scope | None = None
         self.publish: Callable[[dict[str, Any]], None] = lambda message: None
@@ -113,7 +114,7 @@ class VirtualBoard:
         """A new board with the same motor: sliders and faults stay where they are, and a new recording begins."""
         if self.board is not None:
             self.board.close()
-        self.board = Board(self.library)
+        self.board = self._new_board()
         simulate.set_up(self.board, self.job)
         self.rating = rating_of(self.library, self.origin.motor, self.board)
         self.normal = {key: self.board.get(key) for fault in FAULTS.values() for key in fault.keys(self.rating)}
@@ -141,6 +142,16 @@ class VirtualBoard:
         self.state, self.fault = "", "NONE"
         self.note("power-up")
         self.run(FIRST_S)
+
+    def _new_board(self) -> Board:
+        """With the PC as the processor, or the simulated chip that runs an image; nobody compares the two here."""
+        if self.image is None or not isinstance(self.library, pil.PilLibrary):
+            return Board(self.library)
+        board = pil.PilBoard(self.library, self.image)
+        if not board.has_names:
+            raise UserError("the image does not say where its variables are", str(self.image), "leave out IMAGE, or build it with its names")
+        board.lock_step(False)
+        return board
 
     def run(self, seconds: float) -> None:
         """Lets this much motor time pass, a period at least."""
@@ -306,7 +317,7 @@ class VirtualBoard:
     # ---- what a page is told ---------------------------------------------------------------------------------------------
     def hello(self) -> dict[str, Any]:
         """All that a new tab must know."""
-        return {"virtual": True, "motor": self.origin.motor.title, "board": self.origin.board.title,
+        return {"virtual": True, "chip": self.image is not None, "motor": self.origin.motor.title, "board": self.origin.board.title,
                 "defines": [name for name in self.origin.defines if name != SCOPE],
                 "sliders": self.sliders, "pole_pairs": self.rated.pole_pairs, "max_current_a": self.library.params["MAXIMUM_CURRENT_A"],
                 "nominal_bus_v": self.job.values.get(SUPPLY, 24.0),

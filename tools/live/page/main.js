@@ -34,7 +34,7 @@ const board = new BoardView((command) => link.send(command));
 function begin(hello) {
   document.body.classList.toggle("real", !hello.virtual);
   document.body.classList.toggle("told", hello.remote === null); // a board that only tells
-  by("what").textContent = by("what").title = [hello.motor, hello.board, ...hello.defines].join(" · ");
+  by("what").textContent = by("what").title = [hello.motor, hello.board, ...hello.defines, ...(hello.chip ? ["the image in the simulated dsPIC33F"] : [])].join(" · ");
   ["sliders", "throws", "states", "log", "pace"].forEach((id) => by(id).replaceChildren());
   for (const pace of hello.paces) { make("option", { value: pace, textContent: pace === 1 ? "real time" : `1 : ${Math.round(1 / pace)}` }, by("pace")); }
   const send = (command) => link.send(command);
