@@ -13,7 +13,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from tools.bench import case, loadsteps, lowspeed, reach
-from tools.common import paths
+from tools.common import motor_file, paths
 from tools.common.param_rows import number, slow_periods
 
 from . import compiled, constants, limits
@@ -25,6 +25,8 @@ LOWSPEED = lowspeed.Table.read(paths.TABLES / "lowspeed.toml")
 ONSET_S, CURRENT_SHARE = LOWSPEED.torque_over_s, LOWSPEED.current_percent / 100.0
 """What `make lowspeed` asks for: the load comes within this time, and takes so much of the largest current at most."""
 LOADSTEPS = loadsteps.Table.read(paths.TABLES / "loadsteps.toml")
+STEP_SHARE = min(LOADSTEPS.speeds_rpm) / motor_file.load(LOADSTEPS.motor).rated_speed_rpm
+"""The lowest speed of `make loadsteps` over the rated one."""
 MARGIN = 1.15
 """Of the speed that the model holds. With it 16 loads on 8 motors that their rotor's inertia limits were named 0.89 to 1.16 of the lowest speed that
 the virtual board held."""
@@ -94,7 +96,7 @@ def asked_nm(d: Design) -> float:
 
 def step_rpm(d: Design) -> float:
     """The lowest speed at which `make loadsteps` closes the brake."""
-    return min(case.shares(LOADSTEPS.motor, d.motor, LOADSTEPS.speeds_rpm, [])[0])
+    return case.three_digits(STEP_SHARE * d.motor.rated_speed_rpm)
 
 
 def answer_s(d: Design) -> float:
