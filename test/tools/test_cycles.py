@@ -16,6 +16,7 @@ from xc16 import make
 from tools.bench import cycles, pil, pil_command
 from tools.common import paths
 from tools.common.checksum import checksum
+from tools.common.errors import UserError
 from tools.image.budget import Budget, CycleLimits, Limits
 from tools.image.profile import Counts, Profile
 from tools.image.size import write_json
@@ -186,6 +187,29 @@ def test_bad_input_is_one_line(tmp_path, room, arguments, words):
         file.truncate(5 << 30)
     support.refused(support.command(*(word.format(tmp_path) for word in arguments), main=room.main), words)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words, macros, names", [
+    ([], [], ()), (["--app", "panel"], [], ()), (["--app", "analog"], ["APP=analog"], ("app_analog",)),
+    (["--app", "examples/my_app.c"], [f"APP={paths.ROOT}/examples/my_app.c"], ("app_any",)), (["demo", "--app", "analog"], ["APP=analog"], ("demo",))])
+def test_another_application_is_measured_in_its_own_scenario(words, macros, names):
+    options = cycles.parser_of("cycles", "", print).parse_args(words)
+    assert (cycles.macros_of(options), cycles.scenarios_of(options)) == (macros, names)
+    assert cycles.sources_of(options) == {} or not words
+
+
+def test_a_scenario_of_another_application_than_the_image_s_is_refused():
+    with pytest.raises(UserError, match=r"scenario 'app_rc' is for another image \(APP=rc\).*APP=name"):
+        cycles.jobs_of(("app_rc",), None, ["APP=analog"])
+
+
+def test_pil_runs_an_application_s_own_scenario_on_its_image(monkeypatch):
+    asked = []
+    monkeypatch.setattr(pil_command, "image_for", lambda macros, folder, given: asked.append(macros))
+    monkeypatch.setattr(pil_command.pil, "library", lambda macros, folder: asked.append(macros) or sys.exit(7))
+    with pytest.raises(SystemExit):
+        pil_command.main(["--app", "analog"])
+    assert asked == [["APP=analog"]] * 2
 
 
 @pytest.mark.parametrize("given", [[], ["--out", "{}"]])

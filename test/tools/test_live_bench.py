@@ -3,6 +3,7 @@
 import csv
 import io
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,10 @@ from live_support import bench, origin, passes, started, until
 from support import document, refusal
 
 from tools.bench import report, scenario_file, simulate
+from tools.common import paths
 from tools.common.trace import Trace, wrapped_deg
 from tools.live import view, virtual_board
+from tools.live.board import macros_for
 from tools.live.faults import FAULTS
 from tools.live.recording import LONGEST_S, SENT
 
@@ -239,6 +242,19 @@ def test_a_recording_that_is_too_long_or_empty_is_refused_in_one_line():
     board = bench()
     refusal(board.scenario, "do something first")
     refusal(lambda: board.recording.toml(LONGEST_S + 1.0), "120 s", "power up again")
+
+
+def test_a_saved_scenario_names_the_application_that_ran():
+    recording = bench().recording
+    recording.origin = replace(recording.origin, defines=["PARAMS_IN_RAM", "APP=analog"])
+    assert '[firmware]\ndefines = ["PARAMS_IN_RAM"]\napp = "analog"\n' in recording.toml(1.0)
+    recording.origin = replace(recording.origin, defines=["APP=/my/app.c"])
+    assert '[firmware]\napp = "/my/app.c"\n' in recording.toml(1.0)
+
+
+def test_an_application_has_the_scope_beside_it_unless_the_serial_line_is_its_own():
+    assert macros_for("", "analog") == ["APP=analog", "SCOPE=1"] and macros_for("", "text") == ["APP=text"]
+    assert macros_for("", f"{paths.ROOT}/examples/my_app.c")[1:] == ["SCOPE=1"] and macros_for("-DSCOPE=0", "analog") == ["SCOPE=0", "APP=analog"]
 
 
 def test_csv_has_a_row_a_millisecond_and_the_last_two_minutes():

@@ -32,6 +32,13 @@ def app(text: str, where: str, beside: Path | None = None) -> str:
     raise UserError(f"no application '{text}'", where, suggestion(text, sorted(path.stem for path in (paths.ROOT / "firmware" / "app").glob("*.c"))))
 
 
+def has_line(defines: list[str]) -> bool:
+    """Whether the application has the serial line: it includes app/line.h."""
+    named = [Path(define.removeprefix(APP)) for define in defines if define.startswith(APP)]
+    files = [path if path.suffix else paths.ROOT / "firmware" / "app" / f"{path}.c" for path in named]
+    return any(re.search(r'^ *# *include *"app/line\.h"', path.read_text(encoding="utf-8", errors="replace"), re.MULTILINE) for path in files)
+
+
 def _app_name(text: str) -> str:
     path = Path(text)
     return f"app-{path.stem}" + (f"-{zlib.crc32(text.encode()):08x}" if path.suffix else "")

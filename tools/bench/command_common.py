@@ -85,7 +85,7 @@ def scenario_for(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
             raise UserError(f"no scenario is for {' with '.join(sorted(asked))}", "DEFINES",
                             next((f"make {mode.lower()} runs {mode}" for mode in ("IDENTIFY", "BRINGUP") if mode in asked), "name the one to run, SCENARIO=name"))
         name = next((item.name for item in fitting if item.name.upper() in asked), fitting[0].name)
-    item = scenario_file.load(name or _usual(getattr(options, "app", ""), options.motor))
+    item = scenario_file.load(name or usual(getattr(options, "app", ""), options.motor))
     more = [define for define in defines if define not in item.defines]
     if getattr(options, "app", ""):
         more.append(build.app(options.app, "APP"))
@@ -94,7 +94,7 @@ def scenario_for(options: argparse.Namespace) -> tuple[Scenario, list[str]]:
     return item, more
 
 
-def _usual(app: str, motor: str | None) -> str:
+def usual(app: str, motor: str | None = None) -> str:
     """The scenario where none is named: an application of the project has its own, and one for any application presses, turns and waits."""
     if app and app != "panel":
         own = f"app_{app}"

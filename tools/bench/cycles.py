@@ -10,7 +10,7 @@ import functools
 import json
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from tools.image.profile import INTERRUPT, SLOW, Counts, Profile, profile
 from tools.image.size import told
 from tools.image.wcet import RETURN
 
-from . import build, pil, pil_command, scenario_file, simulate, sweep
+from . import build, command_common, pil, pil_command, scenario_file, simulate, sweep
 
 FCY_MHZ = 40.0
 PERIOD_CYCLES = 2000
@@ -346,14 +346,14 @@ def added_data(spreads: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
-def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Job]:
-    """The scenarios, recorded with the interrupt's cycles; all with the firmware as it is delivered."""
+def jobs_of(names: tuple[str, ...], library: pil.PilLibrary, macros: Sequence[str] = ()) -> list[simulate.Job]:
+    """The scenarios, recorded with the interrupt's cycles; all with the firmware as it is delivered, or with the application that `macros` names."""
     jobs = []
     for name in names:
         item = scenario_file.load(name)
-        if item.defines:
-            raise UserError(f"scenario '{item.name}' is for another image ({', '.join(item.defines)})", "make cycles",
-                            "measure scenarios of the firmware as it is delivered")
+        if others := [define for define in item.defines if define not in macros]:
+            raise UserError(f"scenario '{item.name}' is for another image ({', '.join(others)})", "make cycles",
+                            "measure scenarios of the firmware as it is delivered, or name their application, APP=name")
         motor = motor_file.part(item.motor, item.motor_where)
         job = simulate.prepare(item, library, motor, board_file.part(*board_file.named(motor, item.board, item.board_where)))
         job.signals += [signal for signal in SIGNALS if signal not in job.signals]
@@ -361,14 +361,14 @@ def jobs_of(names: tuple[str, ...], library: pil.PilLibrary) -> list[simulate.Jo
     return jobs
 
 
-def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget: Budget, limits: bool, quiet: bool) -> Report:
-    library = pil.library([], userparams)
+def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget: Budget, limits: bool, quiet: bool, macros: Sequence[str] = ()) -> Report:
+    library = pil.library([*macros], userparams)
     if not pil.check_image(library, image):
         raise UserError("the image does not say where functions and variables are", str(image),
                         "name the ELF file that the HEX file was made from")
     elf = image.with_suffix(".elf") if image.suffix == ".hex" else image # a HEX file has its names from there
     code, source = program.read_elf(elf), attribution.read(elf)
-    jobs = jobs_of(names or budget.cycles.scenarios, library)
+    jobs = jobs_of(names or budget.cycles.scenarios, library, macros)
     found = merged(sweep.run_cases("cycles", jobs, quiet, functools.partial(work, image)))
     report = Report(str(paths.shown(image)), found, profile(code, source, found.counts, budget.counted_at), budget if limits else None,
                     assumptions(library))
@@ -380,6 +380,7 @@ def parser_of(name: str, about: str, command: Callable[[argparse.Namespace], int
     """Options of a command that runs scenarios on the image. @param name of the module here and of the file that it writes"""
     parser = command_line.Parser(prog=f"python3 -m tools.bench.{name}", description=about)
     parser.add_argument("scenarios", nargs="*", help="default: those of [cycles] in firmware/budget.toml")
+    parser.add_argument("--app", default="", help="the application: a name of firmware/app, or a file; default: the panel, and with another one its own scenario")
     parser.add_argument("--image", type=Path, help="ELF file with debugging information; default: built with XC16")
     parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
     parser.add_argument("--out", type=Path, help=f"folder for {name}.json; default: the image's")
@@ -389,9 +390,19 @@ def parser_of(name: str, about: str, command: Callable[[argparse.Namespace], int
     return parser
 
 
+def macros_of(options: argparse.Namespace) -> list[str]:
+    """Of the build: the application, if there is another than the panel."""
+    return [build.app(options.app, "APP")] if options.app and options.app != "panel" else []
+
+
+def scenarios_of(options: argparse.Namespace) -> tuple[str, ...]:
+    """Those that were named, else the application's own; none: those of the budget."""
+    return tuple(options.scenarios) or ((command_common.usual(options.app),) if macros_of(options) else ())
+
+
 def sources_of(options: argparse.Namespace) -> dict[str, str]:
     """Which firmware the result is of, where it is the delivered one's and complete: `make readme` need not measure it again."""
-    return {} if options.no_budget or options.scenarios or options.image else {"sources": checksum("chip")}
+    return {} if options.no_budget or options.app or options.scenarios or options.image else {"sources": checksum("chip")}
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -401,8 +412,9 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(options: argparse.Namespace) -> int:
     budget = Budget.read()
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
-    image = pil_command.image_for([], userparams, options.image)
-    report = measure(image, userparams, tuple(options.scenarios), budget, not options.no_budget, options.quiet)
+    macros = macros_of(options)
+    image = pil_command.image_for(macros, userparams, options.image)
+    report = measure(image, userparams, scenarios_of(options), budget, not options.no_budget and not macros, options.quiet, macros)
     return told(summary(report) | sources_of(options), options.out or image.parent, "cycles", text(report) + "\n")
 
 

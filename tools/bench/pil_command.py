@@ -137,6 +137,7 @@ def _arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser = command_line.Parser(prog="python3 -m tools.bench.pil_command", description=__doc__.splitlines()[0])
     parser.add_argument("scenarios", nargs="*", help="names, TOML files, or table2; default demo table2, or the one for the mode of --defines")
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
+    parser.add_argument("--app", default="", help="the application: a name of firmware/app, or a file")
     parser.add_argument("--image", type=Path, help="ELF or HEX file; default: built with XC16")
     parser.add_argument("--motor", help="motor file instead of the scenario's")
     parser.add_argument("--board", help="board file instead of the scenario's")
@@ -154,7 +155,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     """All scenarios, one after the other; the worst of their exit codes."""
-    names = options.scenarios or ([None] if options.defines else DEFAULT)
+    names = options.scenarios or ([None] if options.defines or options.app else DEFAULT)
     if options.out is not None and len(names) > 1:
         raise UserError("one result folder for several scenarios", "--out", "run them one by one")
     status = 0

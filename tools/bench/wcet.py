@@ -9,7 +9,7 @@ import argparse
 import ctypes
 import functools
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -247,13 +247,13 @@ def summary(report: Report) -> dict[str, Any]:
 
 
 # ---- command line --------------------------------------------------------------------------------------------------------
-def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget: Budget, limits: bool, quiet: bool) -> Report:
-    library = pil.library([], userparams)
+def measure(image: Path, userparams: Path | None, names: tuple[str, ...], budget: Budget, limits: bool, quiet: bool, macros: Sequence[str] = ()) -> Report:
+    library = pil.library([*macros], userparams)
     if not pil.check_image(library, image):
         raise UserError("the image does not say where functions and variables are", str(image), "name the ELF file that the HEX file was made from")
     report = of_image(image.with_suffix(".elf") if image.suffix == ".hex" else image)
     report.period_cycles = cycles.period_cycles(library.params)
-    jobs = cycles.jobs_of(names or budget.cycles.scenarios, library)
+    jobs = cycles.jobs_of(names or budget.cycles.scenarios, library, macros)
     found = sweep.run_cases("wcet", jobs, quiet, functools.partial(work, image, report.watch))
     report.seen = functools.reduce(lambda one, two: one + two, found)
     report.broken = broken(report, budget if limits else None)
@@ -266,8 +266,9 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     userparams = None if options.userparams is None else build.header_folder(options.userparams)
-    image = pil_command.image_for([], userparams, options.image)
-    report = measure(image, userparams, tuple(options.scenarios), Budget.read(), not options.no_budget, options.quiet)
+    macros = cycles.macros_of(options)
+    image = pil_command.image_for(macros, userparams, options.image)
+    report = measure(image, userparams, cycles.scenarios_of(options), Budget.read(), not options.no_budget and not macros, options.quiet, macros)
     return told(summary(report) | cycles.sources_of(options), options.out or image.parent, "wcet", text(report) + "\n")
 
 

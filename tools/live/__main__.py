@@ -29,6 +29,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--board", help="board file instead of the motor's: a name in tuning/boards or a path")
     parser.add_argument("--userparams", metavar="FOLDER", help="build with the userparams.h in this folder")
     parser.add_argument("--defines", default="", metavar="MACROS", help="build with more macros, written as \"-DNAME -DNAME=value\"")
+    parser.add_argument("--app", default="", help="the application: a name of firmware/app, or a file")
     parser.add_argument("--library", type=Path, help="a libvboard.so to use instead of building one")
     parser.add_argument("--cpu", choices=("host", "33f"), default="host", help="33f: an image of XC16 in the instruction-set simulator")
     parser.add_argument("--image", type=Path, metavar="FILE", help="such an image (ELF) instead of building one")
@@ -76,14 +77,14 @@ def _real(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any
 
 def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], Any]:
     """Makes the bench of a virtual board."""
-    from .board import with_scope
+    from .board import macros_for
     from .recording import Origin
     from .symbols import Symbols
     from .virtual_board import VirtualBoard
     if options.elf is not None:
         raise UserError("an ELF file without a board", "ELF", "name the board's serial port, PORT=/dev/ttyUSB0")
     words = {name: word for name, word in (("MOTOR", options.motor), ("BOARD", options.board), ("USERPARAMS", options.userparams)) if word}
-    origin = Origin(parts.motor, parts.board, with_scope(command_common.macros(options.defines)), words)
+    origin = Origin(parts.motor, parts.board, macros_for(options.defines, options.app), words)
     symbols = Symbols.read(parts.symbols)
     tuning = _tuning(options, parts, symbols)
     return lambda: VirtualBoard(parts.library, origin, symbols, tuning, parts.image)
@@ -91,13 +92,13 @@ def _virtual(options: argparse.Namespace, parts: "board.Parts") -> Callable[[], 
 
 def _tuning(options: argparse.Namespace, parts: "board.Parts", symbols: "Symbols") -> "Tuning | None":
     """For a firmware whose parameters are variables."""
-    from .board import with_scope
+    from .board import macros_for
     from .symbols import Symbols
     from .tuning import Tuning
     folder = command_common.header_for(options)
     header = ((build.header_folder(folder) if folder else None) or paths.ROOT) / build.HEADER
     files = (parts.motor.path, parts.board.path) if options.motor else None
-    macros = with_scope(command_common.macros(options.defines))
+    macros = macros_for(options.defines, options.app)
     layout = parts.symbols if parts.image is None else build.library(macros, build.header_folder(folder) if folder else None, "live-library").with_name("foc33.elf")
     return Tuning.of(header, macros, Symbols.read(layout), symbols, files)
 
@@ -106,7 +107,7 @@ def _parts(options: argparse.Namespace) -> "board.Parts":
     """Motor, board and firmware; with --library that one, which its ELF file lies beside."""
     from . import board
     if options.library is None:
-        return board.parts(options.motor, options.board, options.defines, options.userparams, options.cpu, options.image)
+        return board.parts(options.motor, options.board, options.defines, options.userparams, options.cpu, options.image, options.app)
     motor, board_part = command_common.parts_of(Scenario("live", "", "", MOTOR, "", 0.0), options)
     library = command_common.library_for([], options.library, options.userparams)
     return board.Parts(motor, board_part, library, None, options.library.with_name("foc33.elf"))

@@ -27,8 +27,13 @@ REST = Scenario("live-board", "", "", MOTOR, "", 0.0)
 
 
 def with_scope(macros: list[str]) -> list[str]:
-    """The scope is on, unless somebody has said SCOPE=0: then the fault recorder has its place."""
-    return macros if any(macro.startswith("SCOPE=") for macro in macros) else [*macros, SCOPE]
+    """The scope is on, unless somebody has said SCOPE=0, or an application has the serial line: then the fault recorder has its place."""
+    return macros if any(macro.startswith("SCOPE=") for macro in macros) or build.has_line(macros) else [*macros, SCOPE]
+
+
+def macros_for(defines: str, app: str = "") -> list[str]:
+    """Those of a build with an application, if one is named, and with the scope."""
+    return with_scope([*command_common.macros(defines), *([build.app(app, "APP")] if app and app != "panel" else [])])
 
 
 STEP_S = 0.002
@@ -52,13 +57,12 @@ class Parts:
 
 def parts(motor: str | None = None, board: str | None = None, defines: str = "", userparams: str | None = None, cpu: str = "host",
           image: Path | None = None, app: str = "") -> Parts:
-    """The parts by their names on the command line; builds the firmware with its scope, or with an application, which may want the line."""
+    """The parts by their names on the command line; builds the firmware with its scope, unless an application wants the line."""
     options = argparse.Namespace(motor=motor, board=board, userparams=userparams)
     motor_part, board_part = command_common.parts_of(REST, options)
     header = command_common.header_for(options)
     folder = None if header is None else build.header_folder(header)
-    macros = command_common.macros(defines)
-    macros = [*macros, build.app(app, "APP")] if app else with_scope(macros)
+    macros = macros_for(defines, app)
     if cpu == "33f":
         elf = pil_command.image_for(macros, folder, image)
         return Parts(motor_part, board_part, pil.library(macros, folder), elf, plain_elf.write(elf, elf.with_suffix(".client.elf")))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tools.bench import build
 from tools.common import output, paths
 from tools.common.board_keys import Part
 from tools.common.errors import UserError
@@ -82,7 +83,9 @@ class Recording:
                  f"motor = {_text(_name(self.origin.motor, paths.MOTORS))}\nboard = {_text(_name(self.origin.board, paths.BOARDS))}\n"
                  f"duration_s = {_number(end_s)}\n"]
         if self.origin.defines:
-            parts.append(f"[firmware]\ndefines = {json.dumps(self.origin.defines)}\n")
+            macros = [text for text in self.origin.defines if not text.startswith(build.APP)]
+            apps = [f"app = {_text(text.removeprefix(build.APP))}\n" for text in self.origin.defines if text not in macros]
+            parts.append("".join(["[firmware]\n", *([f"defines = {json.dumps(macros)}\n"] if macros else []), *apps]))
         if self.plant:
             parts.append("[plant]\n" + "".join(f"{_text(key)} = {_number(value)}\n" for key, value in self.plant.items()))
         sent = (_event(at_s, f"send_hex = {_text(text.encode('latin-1').hex(' '))}") for at_s, text in self.sent)

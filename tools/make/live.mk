@@ -2,10 +2,10 @@
 # `make run`; LOOP SPEED LOAD OUT (make response); PORT ELF (a real board); CPU=33f (the simulated chip, with XC16=folder or IMAGE=file).
 tuned = $(if $(USERPARAMS),:,$(if $(MOTOR),$(tuner) tune $(call quoted,$(MOTOR)) $(board) --brief,:))
 .PHONY: live response live-pictures live-endurance live-board text live-library live-params setup-live setup-scope
-live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= DEFINES=-D... USERPARAMS= PACE=1 LISTEN= CPU=33f IMAGE=file PORT=/dev/ttyUSB0 ELF= KEPT=file]
+live: setup-live ## [run] a page in the browser: buttons, load, faults, rotor and curves in real time [MOTOR= BOARD= APP=name DEFINES=-D... USERPARAMS= PACE=1 LISTEN= CPU=33f IMAGE=file PORT=/dev/ttyUSB0 ELF= KEPT=file]
 	@+$(tuned)
 	@$(alone) $(python) -m tools.live $(what) $(if $(DEFINES),--defines=$(call quoted,$(DEFINES))) $(if $(PACE),--pace $(call quoted,$(PACE))) $(if $(CPU),--cpu $(CPU)) $(if $(IMAGE),--image $(call quoted,$(IMAGE))) \
-	    $(if $(LISTEN),--listen $(call quoted,$(LISTEN))) $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF))) $(if $(KEPT),--kept $(call quoted,$(KEPT)))
+	    $(if $(APP),--app $(call quoted,$(APP))) $(if $(LISTEN),--listen $(call quoted,$(LISTEN))) $(if $(PORT),--port $(call quoted,$(PORT))) $(if $(ELF),--elf $(call quoted,$(ELF))) $(if $(KEPT),--kept $(call quoted,$(KEPT)))
 
 response: setup-scope ## [run] open loops measured over the tuner's model, and steps [MOTOR=name or all, LOOP=current or speed, SPEED=rpm LOAD="N m" CPU=33f PORT=/dev/ttyUSB0 ELF= BOARD= DEFINES=-D... USERPARAMS= OUT=]
 	@+$(if $(every),$(every_motor),$(tuned))
