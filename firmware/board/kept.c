@@ -43,11 +43,9 @@ const uint16_t board_kept_pages[KEPT_PAGES * KEPT_PAGE_SIZE / 2u] __attribute__(
 
 kept_t kept_command;
 
-static uint16_t kept_version;
-static uint16_t kept_newest; /* page of the copy in use, or of the one to be written last */
-static uint16_t kept_number; /* of that copy */
-static uint16_t kept_wrong;  /* a value in RAM is outside its range */
-static uint16_t kept_since_ms;
+static uint16_t kept_version, kept_wrong;      /* a value in RAM is outside its range */
+static uint16_t kept_newest, kept_number;      /* page of the copy in use, or of the one to be written last; that copy's */
+static uint16_t kept_since_ms, kept_coasts_ms; /* since they were compared; so long may the rotor coast yet */
 
 #define FIRST_PAGE KEPT_AT
 #define SECOND_PAGE (KEPT_AT + KEPT_PAGE_SIZE)
@@ -241,10 +239,10 @@ static uint16_t kept_forget(void)
     return (uint16_t)((kept_command.copies == (uint16_t)KEPT_NONE) ? KEPT_RESULT_DONE : KEPT_RESULT_FLASH);
 }
 
-/** A start is the background's own: none comes in between. */
+/** A start is the background's own: none comes in between. What coasts has been counted since the bridge was on. */
 static uint16_t kept_serve(uint16_t request)
 {
-    if (board_drive.state != (uint16_t)DRIVE_STOPPED || board_drive.command.run || P1OVDCON != BOARD_OUTPUTS_OFF) {
+    if (board_drive.state != (uint16_t)DRIVE_STOPPED || board_drive.command.run || kept_coasts_ms != 0u) {
         return KEPT_RESULT_NOT_STOPPED;
     }
     return (request == (uint16_t)KEPT_ASK_KEEP) ? kept_keep() : kept_forget();
@@ -254,6 +252,7 @@ void kept_tick(uint16_t elapsed_ms)
 {
     const uint16_t request = kept_command.request;
     kept_command.request = 0;
+    kept_coasts_ms = (uint16_t)((P1OVDCON != BOARD_OUTPUTS_OFF) ? KEPT_COAST_MS : (kept_coasts_ms != 0u) ? kept_coasts_ms - 1u : 0u);
     kept_since_ms = (uint16_t)(kept_since_ms + elapsed_ms);
     if (request == (uint16_t)KEPT_ASK_KEEP || request == (uint16_t)KEPT_ASK_FORGET) {
         kept_command.result = kept_serve(request);

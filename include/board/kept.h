@@ -10,7 +10,8 @@
 
 #define KEPT_PAGE_SIZE 0x0400u /* 512 words, the least that the chip erases */
 #define KEPT_PAGES 2u
-#define KEPT_AT 0x5000u /* the flash's last two pages; its CRC ends before them (BOARD_FLASH_CRC_AT) */
+#define KEPT_COAST_MS 5000u /* a rotor that was let go may turn for so long */
+#define KEPT_AT 0x5000u     /* the flash's last two pages; its CRC ends before them (BOARD_FLASH_CRC_AT) */
 
 /* ---- What a client asks for, and hears ---- */
 
@@ -23,7 +24,7 @@
 #define KEPT_RESULT_TABLE(X) \
     X(0, NONE, "nothing was asked for yet") \
     X(1, DONE, "done") \
-    X(2, NOT_STOPPED, "refused: only in STOPPED with the bridge off") \
+    X(2, NOT_STOPPED, "refused: only in STOPPED, 5 s after the bridge was on: the rotor must stand") \
     X(3, RANGE, "refused: a value is outside its range, or does not fit the others") \
     X(4, FLASH, "the flash does not hold what was written")
 

@@ -156,7 +156,7 @@ def test_while_the_motor_turns_it_is_refused_by_its_reason(bench: Bench) -> None
     bench.do(release="S2")
     until(lambda: bench.frame()["state"] == "CLOSED", "does not turn", 30.0)
     bench.do(keep=True)
-    bench.logs("keep: refused: only in STOPPED with the bridge off")
+    bench.logs("keep: refused: only in STOPPED, 5 s after the bridge was on: the rotor must stand")
     bench.says(state="NONE")
 
 

@@ -223,6 +223,29 @@ void test_the_last_of_many_is_kept_also_where_the_copies_numbers_wrap(void)
 
 /* ---- when it is written ---- */
 
+/** So long as a rotor may coast. */
+static void coasted(void)
+{
+    for (unsigned ms = 0; ms < KEPT_COAST_MS; ms++) {
+        kept_tick(1);
+    }
+}
+
+void test_it_is_refused_while_a_rotor_that_was_let_go_may_coast(void)
+{
+    uint32_t before = *page_word(0, 0);
+    P1OVDCON = BOARD_OUTPUTS_BOOTSTRAP;
+    kept_tick(1);
+    P1OVDCON = BOARD_OUTPUTS_OFF;
+    for (unsigned ms = 1; ms < KEPT_COAST_MS; ms++) {
+        ask((ms % 1000u == 0u) ? KEPT_ASK_FORGET : KEPT_ASK_KEEP);
+        TEST_ASSERT_EQUAL_UINT16(KEPT_RESULT_NOT_STOPPED, kept_command.result);
+    }
+    TEST_ASSERT_EQUAL_HEX32(before, *page_word(0, 0));
+    ask(KEPT_ASK_KEEP);
+    TEST_ASSERT_EQUAL_UINT16(KEPT_RESULT_DONE, kept_command.result);
+}
+
 void test_it_is_refused_in_every_other_state(void)
 {
     static const uint16_t requests[] = { KEPT_ASK_KEEP, KEPT_ASK_FORGET };
@@ -246,6 +269,7 @@ void test_it_is_refused_in_every_other_state(void)
         ask(requests[n]);
         TEST_ASSERT_EQUAL_UINT16(KEPT_RESULT_NOT_STOPPED, kept_command.result);
         P1OVDCON = BOARD_OUTPUTS_OFF;
+        coasted();
     }
     TEST_ASSERT_EQUAL_HEX32(before, *page_word(0, 0));
     TEST_ASSERT_EQUAL_UINT16(0, host_watchdog_serves);
