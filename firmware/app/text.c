@@ -1,4 +1,4 @@
-/* Application: the motor is run by lines of text, 115200 baud: run, stop, speed 1500, status, clear, each with its checksum ("run*69").
+/* Application: the motor is run by lines of text, 115200 baud: run, stop, speed 1500, status, fault, clear, each with its checksum ("run*69").
  * Each is answered with what the drive does and its fault. Without a right line for TEXT_SILENT_MS the motor stops in order. tools/live/text.py talks to it. */
 #include "app/line.h"
 
@@ -30,7 +30,7 @@ static const char *obey(const char *line, const app_told_t *told, app_asks_t *as
     } else if (app_line_is(line, "clear")) {
         asks->clear_fault = 1;
     } else {
-        return app_line_is(line, "status") ? "ok" : "unknown";
+        return (app_line_is(line, "status") || app_line_is(line, "fault")) ? "ok" : "unknown"; /* each answer has both */
     }
     return "ok";
 }

@@ -87,7 +87,7 @@ def test_the_client_turns_a_motor_of_the_virtual_board(monkeypatch):
 
 @pytest.mark.parametrize("arguments, said, shown", [
     (["run", "1500", "--seconds", "0"], ["speed 1500", "run", "stop"], "stands"), (["speed", "-900"], ["speed -900", "status"], "runs, 1498 rpm, fault NONE"),
-    (["fault"], ["status"], "NONE"), (["status"], ["status"], "runs, 1498 rpm"), (["clear"], ["clear"], "runs"), (["stop"], ["stop"], "stands")])
+    (["fault"], ["fault"], "NONE"), (["status"], ["status"], "runs, 1498 rpm"), (["clear"], ["clear"], "runs"), (["stop"], ["stop"], "stands")])
 def test_each_command_of_the_client_says_its_lines(monkeypatch, capsys, arguments, said, shown):
     spoken = []
 

@@ -110,6 +110,14 @@ void test_a_speed_outside_the_range_changes_nothing(void)
     }
 }
 
+void test_the_fault_is_told_by_a_line_of_its_own_as_by_each_other(void)
+{
+    TEST_ASSERT_EQUAL_STRING_LEN("ok run 0 speed 0 fault NONE*", says("fault*6A\n"), 28);
+    told.fault = (uint16_t)FAULT_STALL;
+    TEST_ASSERT_EQUAL_STRING_LEN("ok run 0 speed 0 fault STALL*", says("fault*6A\n"), 29);
+    TEST_ASSERT_EQUAL_INT16(0, asks.run);
+}
+
 void test_a_line_that_is_no_command_is_unknown(void)
 {
     static const char *const lines[] = { "hello*62\n", "speed*67\n", "speed *47\n", "speed 15x*3B\n", "speed -*6A\n", "speed 99999*7E\n", "runs*1A\n", "*00\n" };

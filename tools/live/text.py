@@ -106,7 +106,7 @@ def _run(options: argparse.Namespace) -> int:
     drive = TextDrive(lnet.open_port(options.port))
     if options.rpm is not None:
         drive.command(f"speed {options.rpm}")
-    status = drive.command("status" if options.command in ("speed", "fault") else options.command)
+    status = drive.command("status" if options.command == "speed" else options.command)
     print(status.fault if options.command == "fault" else status.text(), flush=True)
     if options.command == "run":
         try:
