@@ -401,7 +401,7 @@ def _share(_: UserParms, count: float) -> str:
     return f"{count / Q15 if abs(count) > 1.0 else count:.4g}"
 
 
-LOOP_WHY = "CURRENT_BANDWIDTH_HZ gives both gains from R and L; the line itself works in userparams.h, too"
+LOOP_WHY = "CURRENT_BANDWIDTH_HZ gives both gains from R and L; [tune] CURRENT_BANDWIDTH_HZ keeps yours, and the line itself works in userparams.h"
 SPEED_WHY = "SPEED_BANDWIDTH_HZ gives the gain from the inertia, a load observer takes the integral's place"
 NAMES: dict[str, Known] = {
     "LOOPTIME_SEC": Known(_unit("us", 1e6), "board [pwm] period"), "DEADTIME_SEC": Known(_unit("us", 1e6), "board [pwm] dead_time"),
@@ -419,14 +419,15 @@ NAMES: dict[str, Known] = {
     "KFILTER_ESDQ_FW": Known(_hertz, "", "AN1292's corner lets the angle swing; [tune] KFILTER_ESDQ_FW keeps yours"),
     "KFILTER_VELESTIM": Known(_hertz, "", "the tuner's, from the rotor's inertia; [tune] KFILTER_VELESTIM keeps yours"),
     "INITOFFSET_TRANS_OPEN_CLSD": Known(_unit("degrees", 360.0 / 65536.0), "", "the hand-over measures the angle instead of assuming it"),
-    "LOCK_TIME": Known(lambda f, v: f"{v * f.period_s:.3g} s", "", "the current grows slowly while it turns: the tuner takes the time from the rotor's swing"),
+    "LOCK_TIME": Known(lambda f, v: f"{v * f.period_s:.3g} s", "", "the current grows slowly while it turns: the tuner takes the time from the rotor's swing; [tune] LOCK_TIME keeps yours"),
     "END_SPEED_RPM": Known(_unit("rpm"), "[tune] END_SPEED_RPM"),
     "OPENLOOP_RAMPSPEED_INCREASERATE": Known(lambda f, v: f"{ramp_rpm_s(v, f.pole_pairs, f.period_s):.4g} rpm/s", "[tune] OPENLOOP_RAMPSPEED_INCREASERATE"),
     "Q_CURRENT_REF_OPENLOOP": Known(_ampere, "[tune] Q_CURRENT_REF_OPENLOOP"),
     "SPEEDREFRAMP": Known(lambda f, v: f"{reference_ramp(f):.4g} rpm/s", "[tune] SPEEDREFRAMP_RPM_PER_S"),
     "SPEEDREFRAMP_COUNT": Known(_unit("periods"), "", "part of SPEEDREFRAMP"), "TUNING_DELAY_RAMPUP": Known(_unit("periods"), "[tune] TUNING_DELAY_RAMPUP"),
     **{f"{axis}_CURRCNTR_PTERM": Known(_gain, "", LOOP_WHY) for axis in "DQ"}, **{f"{axis}_CURRCNTR_ITERM": Known(_integral, "", LOOP_WHY) for axis in "DQ"},
-    **{f"{loop}_CTERM": Known(_share, "", "anti-windup has a number of its own") for loop in ("D_CURRCNTR", "Q_CURRCNTR", "SPEEDCNTR")},
+    **{f"{loop}_CTERM": Known(_share, "", "anti-windup has a number of its own; the line itself works in userparams.h") for loop in ("D_CURRCNTR", "Q_CURRCNTR")},
+    "SPEEDCNTR_CTERM": Known(_share, "", "a load observer takes the integral's place"),
     **{f"{axis}_CURRCNTR_OUTMAX": Known(_share, "", "the voltage circle limits both axes together") for axis in "DQ"},
     "SPEEDCNTR_PTERM": Known(lambda f, v: f"{16.0 * v / Q15 * f.pole_pairs * f.ampere * 1e3:.3g} mA/rpm", "", SPEED_WHY), "SPEEDCNTR_ITERM": Known(_share, "", SPEED_WHY),
     "SPEEDCNTR_OUTMAX": Known(_ampere, "[rating] maximum_current"),

@@ -22,7 +22,7 @@ from tools.common.toml_file import Document
 from tools.common.units import Kind
 
 from . import an1292, board, c_header, fw_tables, limits
-from .an1292 import UserParms
+from .an1292 import Line, UserParms
 from .design import Design, design, plain
 from .fw_tables import Entry, Tables
 
@@ -475,13 +475,21 @@ def text(plan: Plan) -> str:
              f"{found.volt * 1e3:.4g} mV (U0) and {found.ampere * 1e3:.4g} mA (I0)", "", *_columns([("line", "name", "header", "is", "goes to")] + [
                  (str(line.line), line.name, line.written, line.shown, line.goes_to) for line in found.lines if line.goes_to])]
     lines += _table_lines(found)
-    for title, rows in (("no counterpart:", [f"line {line.line} {line.name}{f' ({line.shown})' if line.shown else ''}: {line.why}" for line in found.lines if not line.goes_to]),
-                        ("branches:", found.header.branches), ("contradictions:", found.contradictions), ("notes:", [*found.header.notes, *found.notes]),
+    others: dict[bool, list[str]] = {True: [], False: []}
+    for line in found.lines:
+        if not line.goes_to:
+            others[_has_counterpart(line)].append(f"line {line.line} {line.name}{f' ({line.shown})' if line.shown else ''}: {line.why}")
+    for title, rows in (("chosen anew, what takes its place is named:", others[True]), ("no counterpart:", others[False]), ("branches:", found.header.branches), ("contradictions:", found.contradictions), ("notes:", [*found.header.notes, *found.notes]),
                         ("not taken over:", plan.dropped),
                         ("not in the header, estimated (SET=\"inertia=... friction=... current=... torque=...\" says it):", plan.estimated)):
         if rows:
             lines += ["", title, *(f"  {row}" for row in rows)]
     return "\n".join(lines) + "\n"
+
+
+def _has_counterpart(line: Line) -> bool:
+    """Whether something here takes its place: a name of userparams.h that the reason tells, or its own."""
+    return "userparams.h" in line.why or bool({line.name, *re.findall(r"[A-Z][A-Z0-9_]+", line.why)} & set(parameters()))
 
 
 def _columns(rows: list[tuple[str, ...]]) -> list[str]:

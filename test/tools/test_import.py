@@ -105,6 +105,8 @@ def test_everything_is_told_value_line_place_branch_reason_and_estimate(pump):
                   r"line 9: #ifdef TUNING is not taken", r'line 5: #include "general\.h" is not read', r"torque 0\.08\d+ N m: torque constant times current",
                   r"SNAPSHOT +a mode +DEFINES=-DSNAPSHOT", r"next: make run MOTOR=pump"):
         assert re.search(words, pump.out), words
+    anew, _, none = pump.out.partition("chosen anew, what takes its place is named:")[2].partition("no counterpart:")
+    assert "D_CURRCNTR_PTERM (" in anew and "[tune] CURRENT_BANDWIDTH_HZ keeps yours" in anew and "INITOFFSET" not in anew and "_CURRCNTR_PTERM" not in none
     assert "inertia" not in pump.out.partition("estimated (")[2].partition(":\n")[2].partition("wrote")[0] and "contradictions:" not in pump.out
 
 
