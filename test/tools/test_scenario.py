@@ -233,3 +233,21 @@ def test_a_motor_and_a_board_are_seen_from_the_scenario_s_folder(tmp_path, monke
     assert (item.motor, item.board) == (str(tmp_path / "mine" / "a motor.toml"), "./old.toml")
     assert item.notes == [f"{paths.shown(file)} line 4: './old.toml' is found from the current folder, not from the file's: write \"../old.toml\""]
     assert not load("demo").notes
+
+
+def test_what_an_application_asks_for_after_an_event_shifts_what_comes_later():
+    slow = HEADER | {"OPENLOOP_RAMPSPEED_INCREASERATE": 1.0, "LOCK_TIME": 32000.0, "END_SPEED_RPM": 1200.0, "SPEEDREFRAMP_RPM_PER_S": 500.0}
+    item, found = load("app_rc"), in_numbers(load("app_rc"), None, slow)
+    moved = {a.at_s: b.at_s - a.at_s for a, b in zip(item.events, found.events)}
+    start_s = 1.6 + 1200.0 * 5 / 60 * 50e-6 * 65536 * 1024 * 50e-6 + 0.4
+    ramp_s = (2575.0 - 150.0) / 500.0 - 1.0
+    assert moved[3.0] == 0.0 and moved[5.0] == moved[6.0] == pytest.approx(start_s - 1.6, abs=0.3) and moved[8.5] - moved[6.0] == pytest.approx(ramp_s, abs=0.1)
+    stop, fault = (next(x for x in found.expectations if type(x).__name__ == name) for name in ("StopExpectation", "FaultExpectation"))
+    assert stop.after_s == 9.5 + moved[9.5] and stop.within_s == pytest.approx(1.5 + 2575.0 / 500.0 - 1.0) and fault.kept_to_s == pytest.approx(14.0 + moved[13.5])
+    assert [measure.reference_rpm for measure in found.measures] == [150.0, 2575.0, 2575.0]
+
+
+@pytest.mark.parametrize("name", ["app_analog", "app_fan", "app_fan_ntc", "app_fixed_speed", "app_rc", "app_pwm"])
+def test_a_scenario_of_an_application_asks_for_no_speed_of_one_motor_alone(name):
+    item = load(name)
+    assert item.follows_header and all(measure.reference or measure.reference_rpm in (800.0, 1500.0, 1900.0, 3000.0) for measure in item.measures) # what fan.c and fixed_speed.c say

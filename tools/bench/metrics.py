@@ -10,6 +10,8 @@ from tools.common.trace import Trace, wrapped_deg
 
 SPEEDS = ("minimum", "nominal", "maximum")
 """Speeds of the header by name."""
+MIDDLE, STANDSTILL = "middle", "standstill"
+"""Half way from the lowest to the highest; none."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,7 @@ class Measure:
     reference_rpm: float | None = None
     reference_percent: float | None = None
     reference: str = ""
-    """which of SPEEDS"""
+    """which of SPEEDS, or MIDDLE"""
     step_rpm: float = 0.0
     """of the potentiometer: where the firmware's reference is that near to reference_rpm, the speed is held against it"""
 

@@ -7,7 +7,7 @@ from typing import Any
 from tools.common.errors import UserError
 from tools.common.board_keys import Values
 from tools.common.param_rows import number
-from .metrics import Measure
+from .metrics import MIDDLE, STANDSTILL, Measure
 
 BRAKE = "load.constant_nm"
 POT_STEPS = 1024
@@ -15,6 +15,8 @@ START_MARGIN_S = 0.4
 """Debouncing, charging of the drivers and waiting for the estimator's agreement, at most."""
 RAMP_S, SETTLE_S = 1.0, 1.0
 """What a scenario with `follows_header` leaves for a ramp of the speed reference, and for the speed to settle."""
+APP_START_S = 1.6
+"""What a scenario of an application leaves for the start."""
 SETTLE_PERIODS, SLOW_PERIODS, LONGEST_SETTLE_S = 5.0, 3.0, 20.0
 """Of the speed loop's bandwidth, and of what is left of it at low speed, where it falls with the speed."""
 FULL_RATIO = number("PARAM_FULL_RATIO")
@@ -39,6 +41,9 @@ class Event:
     """which of SPEEDS, the line to send, or the bytes to send as characters"""
     written: str = ""
     """how the file gave the value, where that is not the kind and the value"""
+    then: str = ""
+    """speed that an application asks for after it: one of SPEEDS, MIDDLE or STANDSTILL"""
+    then_rpm: float | None = None
     finds_range: bool = False
     """the operator presses S3 where the speed lies in the potentiometer's other range"""
 
@@ -113,13 +118,14 @@ def start_time_s(params: Mapping[str, float]) -> float:
 
 def stretched(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: float = 0.0) -> Scenario:
     """The scenario with the time that this header takes for the start and for each change of speed, where that is more than the file leaves."""
-    delays = list(_delays(scenario, params, coast_s_per_rpm))
+    by_application = any(event.then or event.then_rpm is not None for event in scenario.events)
+    delays = list(_delays_of_application(scenario, params) if by_application else _delays(scenario, params, coast_s_per_rpm))
 
     def later(at_s: float) -> float:
         return at_s + sum(extra_s for after_s, extra_s in delays if after_s < at_s)
 
     def moved(item: Any) -> Any:
-        times = {name: later(getattr(item, name)) for name in ("at_s", "from_s", "to_s", "after_s") if getattr(item, name, None) is not None}
+        times = {name: later(getattr(item, name)) for name in ("at_s", "from_s", "to_s", "after_s", "kept_to_s", "cleared_from_s") if getattr(item, name, None) is not None}
         within = getattr(item, "within_s", None)
         if within is not None: # the start itself, or the stop's ramp
             times["within_s"] = within + sum(extra_s for after_s, extra_s in delays if after_s == getattr(item, "after_s", delays[0][0]))
@@ -131,14 +137,43 @@ def stretched(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: 
                    measures=[moved(measure) for measure in scenario.measures], expectations=[moved(item) for item in scenario.expectations])
 
 
+def _settle_s(params: Mapping[str, float], rpm: float) -> float:
+    """How much longer than SETTLE_S the speed takes to settle."""
+    hz, full_hz = param(params, "SPEED_BANDWIDTH_HZ"), param(params, "LOAD_BANDWIDTH_HZ") / FULL_RATIO
+    share = min(1.0, max(rpm, 1.0) * param(params, "NOPOLESPAIRS") / 60.0 / full_hz)
+    return min(max(SETTLE_PERIODS / hz, SLOW_PERIODS / hz / share, SETTLE_S) - SETTLE_S, LONGEST_SETTLE_S)
+
+
+def _delays_of_application(scenario: Scenario, params: Mapping[str, float]) -> Iterator[tuple[float, float]]:
+    """The same where an application decides what the motor does: its events say what it makes of them."""
+    slope, down, now = param(params, "SPEEDREFRAMP_RPM_PER_S"), decel_rpm_s(params), abs(scenario.speed_rpm)
+    for event in scenario.events:
+        asked = _then_rpm(event, params)
+        if asked is None:
+            continue
+        before, now = now, asked
+        if before == 0.0 and now > 0.0:
+            to_speed_s = max(now - param(params, "END_SPEED_RPM"), 0.0) / slope
+            yield event.at_s, max(start_time_s(params) - APP_START_S, 0.0) + max(to_speed_s - RAMP_S, 0.0) + _settle_s(params, now)
+        elif now > 0.0:
+            yield event.at_s, max((now - before) / slope - RAMP_S, (before - now) / down - RAMP_S, 0.0) + _settle_s(params, now)
+        else:
+            yield event.at_s, max(before / down - RAMP_S, 0.0)
+
+
+def _then_rpm(event: Event, params: Mapping[str, float]) -> float | None:
+    """The speed after an event, within the header's; None where it asks for none."""
+    if event.then_rpm is not None:
+        return min(max(event.then_rpm, _named_speed("minimum", params)), _named_speed("maximum", params))
+    return _named_speed(event.then, params) if event.then else None
+
+
 def _delays(scenario: Scenario, params: Mapping[str, float], coast_s_per_rpm: float) -> Iterator[tuple[float, float]]:
     """When something takes longer than the file leaves for it, and by how much; the first is the start."""
     slope, down, now, coasting = param(params, "SPEEDREFRAMP_RPM_PER_S"), decel_rpm_s(params), 0.0, coast_s_per_rpm
 
     def settle_s(rpm: float) -> float:
-        hz, full_hz = param(params, "SPEED_BANDWIDTH_HZ"), param(params, "LOAD_BANDWIDTH_HZ") / FULL_RATIO
-        share = min(1.0, max(rpm, 1.0) * param(params, "NOPOLESPAIRS") / 60.0 / full_hz)
-        return min(max(SETTLE_PERIODS / hz, SLOW_PERIODS / hz / share, SETTLE_S) - SETTLE_S, LONGEST_SETTLE_S)
+        return _settle_s(params, rpm)
 
     presses = [event.at_s for event in scenario.events if event.kind == "press" and event.button == "S2"]
     for event in scenario.events:
@@ -191,6 +226,10 @@ def _share(percent: float, rating: Rating, least_rpm: float) -> float:
 
 
 def _named_speed(name: str, params: Mapping[str, float]) -> float:
+    if name == STANDSTILL:
+        return 0.0
+    if name == MIDDLE:
+        return 0.5 * (_named_speed("minimum", params) + _named_speed("maximum", params))
     return param(params, f"{name.upper()}_SPEED_RPM")
 
 

@@ -10,7 +10,7 @@ from tools.common.errors import suggestion
 from tools.common.toml_file import REQUIRED, Document, Section
 from . import build
 from .expect import read_expectations
-from .metrics import SPEEDS, Measure
+from .metrics import MIDDLE, SPEEDS, STANDSTILL, Measure
 from .panel import HOLD_S
 from .scenario import Event, Scenario
 
@@ -123,13 +123,15 @@ def _read_event(section: Section, duration_s: float) -> list[Event]:
     note = section.text("note", "", "text for the protocol")
     hold_s = section.number("hold_s", None, 0.001, duration_s, "how long the button is held")
     over_s = section.number("over_s", None, 0.0, duration_s, "how long the change takes, in a straight line")
+    then = section.choice("then", (STANDSTILL, *SPEEDS, MIDDLE), "", "speed that an application asks for after it: with follows_header what comes later waits for that")
+    then_rpm = section.number("then_rpm", None, 0.0, meaning="the same as a number")
     kind = section.one_of(tuple(EVENT_KINDS))
     meaning = EVENT_KINDS[kind]
     if hold_s is not None and kind != "press":
         raise section.fail("hold_s", f"'hold_s' with '{kind}'", "only press is held; remove it")
     if over_s is not None and kind in ("start_rpm", "press", "debug", "parameter", "send", "send_hex"):
         raise section.fail("over_s", f"'over_s' with '{kind}'", "only potentiometer and set can take time; remove it")
-    event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0}
+    event = {"at_s": at_s, "kind": kind, "where": section.where(kind), "note": note, "over_s": over_s or 0.0, "then": then, "then_rpm": then_rpm}
     if kind == "start_rpm":
         turned = Event(0.0, "speed_rpm", event["where"], value=section.number(kind, meaning=meaning))
         return [turned, Event(at_s, "press", event["where"], button="S2", hold_s=HOLD_S, note=note)]
@@ -214,7 +216,7 @@ def _read_measures(sections: list[Section], scenario: Scenario) -> None:
         if len(given) > 1:
             raise section.fail(given[1], f"'{given[0]}' and '{given[1]}' together", "keep one of them")
         references = {"reference_rpm": rpm, "reference_percent": section.number("reference_percent", None, meaning="the same as a share of the rated speed"),
-                      "reference": section.choice("reference", SPEEDS, "", "the same by the header's name")}
+                      "reference": section.choice("reference", (*SPEEDS, MIDDLE), "", "the same by the header's name, or half way from minimum to maximum")}
         section.close()
         if to_s <= from_s:
             raise section.fail("to_s", f"to_s = {to_s:g} is not after from_s = {from_s:g}", "choose a later one")
