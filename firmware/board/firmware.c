@@ -93,7 +93,9 @@ void firmware_init(void)
     ch0_bridge = 0;
     firmware_choose_input(BOARD_AD1CHS0);
 #endif
-    ClrWdt();
+    do { /* broken code: the background would end in the next reset, and the fault untold */
+        ClrWdt();
+    } while (RESET_WAS(IOPUWR, board_reset_cause) && board_selftest_failed);
 }
 
 #if HEAT_USED

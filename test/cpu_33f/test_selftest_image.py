@@ -19,6 +19,7 @@ TESTS = {name: int(code) for code, name, *_ in rows("include", "drive/selftest.h
 STATE, DIRECTION, TICKS = 6, 14, 10 # bytes from board_drive
 RAM_START, RAM_END, SPLIM = 0x0800, 0x1000, 0x0FF0
 SELFTEST, ADC_LOST = 20, 10
+ILLEGAL = 0xE00102
 C = library.c
 for _name, _result, *_arguments in (
         ("vb_iss_core", ctypes.c_void_p, ctypes.c_void_p), ("iss_poke", None, ctypes.c_void_p, ctypes.c_uint16, ctypes.c_uint16),
@@ -208,6 +209,19 @@ def test_a_changed_bit_of_flash_is_found_at_a_start(board: PilBoard) -> None:
     board.power_up()
     pass_ms(board, 100)
     assert board.variable("board_selftest_failed", 1) == [TESTS["FLASH"]] and board.get("fw.fault") == SELFTEST
+
+
+def test_a_background_that_no_longer_is_code_ends_in_a_fault_and_not_in_one_start_after_the_other(elf: program.Elf, board: PilBoard) -> None:
+    running(board)
+    core = C.vb_iss_core(board._vb)
+    C.iss_program(core)[elf.symbols["_firmware_background"] // 2] = ILLEGAL
+    C.iss_program_changed(core)
+    pass_ms(board, 150) # a start looks at the flash
+    assert board.get("pwm.outputs_on") == 0 and board.get("fw.fault") == SELFTEST
+    resets = board.get("cpu.resets")
+    pass_ms(board, 200)
+    assert board.get("cpu.resets") == resets == 2 # the watchdog's test, and one
+    assert board.get("fw.fault") == SELFTEST and board.get("pwm.outputs_on") == 0
 
 
 # ---- variables, flow, stack -------------------------------------------------------------------------------------------------
