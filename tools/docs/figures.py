@@ -11,7 +11,7 @@ from pathlib import Path
 from tools.bench import cycles
 from tools.common import paths
 from tools.common.errors import UserError
-from tools.image import size
+from tools.image import options, size
 
 ROOT = paths.ROOT
 
@@ -341,6 +341,7 @@ BLOCKS: dict[str, list[Part]] = {
     "tests": [Part(("tests",), tests)],
     "table2": [Part(("table2",), table2)],
     "size": [Part(("size",), lambda: size.readme_table(loaded("target/size.json")))],
+    "options": [Part(("options",), lambda: options.table(loaded("target/options.json")))],
     "cycles": [Part(("cycles", "wcet"), lambda: cycles.readme_table(loaded("target/cycles.json"), loaded("target/wcet.json")))],
     "demo 40 kHz": [Part(("demo_40khz",), lambda: demo("demo_40khz"))],
     "table2 40 kHz": [Part(("table2_40khz",), lambda: table2("table2_40khz"))],

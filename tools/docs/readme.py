@@ -52,6 +52,7 @@ SOURCES = {
     **{name: Source((f"run SCENARIO={name}",), takes="seconds") for name in ("stop_from_top", "fault_stall")},
     "table2": Source(("table2",), takes="seconds"),
     "size": Source(("size",), "image", "seconds", "target/size.json"),
+    "options": Source(("options",), "image"),
     **{name: Source((name,), "chip", "seconds", f"target/{name}.json") for name in ("cycles", "wcet")},
     **{name: Source((name,)) for name in ("starts", "motors")},
     "tune-fw": Source(("tune-fw",), pictures=(("tune-fw/hurst_dmb0224c10002/over_speed.png", "tuning-fw.png"),)),

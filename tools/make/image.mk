@@ -38,13 +38,24 @@ target_link = $(xc16)gcc $(target_part) -T p$(target_device).gld
 
 target_unit = $(call includes_of,$(firmware_sources))
 
-.PHONY: firmware image flash project find-xc16
+# As for a larger chip: says by how much an image does not fit this one, or with MEASURE=1 what it takes.
+target_script = $(firstword $(wildcard $(if $(DFP),$(DFP)/xc16/support/dsPIC33F/gld/p$(target_device).gld) $(dir $(shell command -v $(xc16)gcc))../support/dsPIC33F/gld/p$(target_device).gld))
+overfull = tools/make/overfull.sh $(call quoted,$(target_script)) $X/wide $X/options $(subst -T p$(target_device).gld,,$(target_link)) $X/image.o $X/app.o -Wl,$(target_link_options)
+
+.PHONY: firmware image image-room options flash project find-xc16
 firmware: find-xc16 ## [your board] the image for the dsPIC by XC16: build/target/foc33.hex [OPT=-O2 XC16=folder DEFINES= USERPARAMS= APP=name]
 	$(call build,$X/checked)
 	@cat $X/checked
 
 image: find-xc16
 	$(call build,$X/foc33.elf)
+
+image-room: find-xc16
+	$(call build,-s $X/image.o $X/app.o)
+	@MEASURE=1 $(overfull)
+
+options: setup-run find-xc16 ## [your board] what each option of userparams.h costs in flash and RAM [XC16=folder]
+	@$(python) -m tools.image.options
 
 find-xc16:
 	@command -v $(xc16)gcc >/dev/null || { \
@@ -96,7 +107,8 @@ $X/%.o: %.c $X/flags | $X/params
 
 $X/foc33.elf: $X/image.o $X/app.o tools/image/crc.py
 	$(call say,ld,$@)$(target_link) -o $@ $(filter %.o,$^) -Wl,-Map=$X/foc33.map,$(target_link_options) >$X/foc33.memory 2>&1 || \
-	    { reason=$$(grep -iEm 1 'undefined reference|error|could not|cannot|is full|multiple definition' $X/foc33.memory); \
+	    { printf '%s\n' $(call quoted,$(DEFINES)) | cat - $(call quoted,$(or $(USERPARAMS),.)/userparams.h) >$X/options; \
+	    ! grep -q 'Could not allocate\|is full' $X/foc33.memory || ! $(overfull) >&2 || { rm -f $@; exit 1; }; reason=$$(grep -iEm 1 'undefined reference|error|could not|cannot|is full|multiple definition' $X/foc33.memory); \
 	    echo "foc33: the image does not link: $${reason#: } (more in $X/foc33.memory)" >&2; rm -f $@; exit 1; }
 	@! grep -i warning $X/foc33.memory >&2 || { rm -f $@; exit 1; }
 	$(target_setup)
