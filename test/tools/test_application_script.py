@@ -9,8 +9,9 @@ from tools.common import paths
 HOOKS = "void app_init(void);\nvoid app_ms(void);\nvoid app_init(void) {}\nvoid app_ms(void) {}\n"
 
 
-def compiled(folder, text: str, name: str = "mine.c"):
-    (folder / name).write_text(text)
+def compiled(folder, text: str | None, name: str = "mine.c"):
+    if text is not None:
+        (folder / name).write_text(text)
     command = [paths.ROOT / "tools" / "make" / "app.sh", "app.o", name, "shown.c", "nm", "gcc", f"-I{paths.ROOT}/include", "-MMD", "-MP"]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
@@ -21,6 +22,13 @@ def test_an_application_that_has_another_name_now_does_not_stop_make(tmp_path):
     (tmp_path / "mine.c").rename(tmp_path / "other.c")
     done = subprocess.run(["make", "APP=other.c"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "built from other.c\n", "")
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+def test_an_application_in_utf_16_is_called_so(tmp_path, encoding):
+    (tmp_path / "mine.c").write_bytes(b'#line 1 "mine.c"\n' + HOOKS.encode(encoding))
+    done = compiled(tmp_path, None)
+    assert (done.returncode, done.stderr) == (2, "foc33: shown.c is UTF-16: save it as UTF-8\n")
 
 
 @pytest.mark.parametrize("text, says", [

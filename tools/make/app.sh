@@ -7,6 +7,10 @@ shift 4
 helpers='^__(gcov|ubsan|asan|sanitizer|cyg)_|^_*(u?div|u?mod|mul|ashl|ashr|lshr|add|sub|neg|eq|ne|lt|le|gt|ge|cmp|ucmp|fix|fixuns|float|floatun|extend|trunc)[a-z]*[shdtq][if]+[shdtq]?[if]?[0-9]?$'
 allowed='button_pressed app_rpm_of app_share app_may_pass app_between app_lights app_line_is_right app_line_is app_line_number app_line_put app_line_put_number app_line_put_fault app_line_end memcpy memset memmove _memcpy _memset _memmove GLOBAL_OFFSET_TABLE_'
 
+if ! tr -d '\000' <"$source" | cmp -s - "$source"; then
+    echo "foc33: $shown is UTF-16: save it as UTF-8" >&2
+    exit 2
+fi
 first=$(grep -n '^ *# *include' "$source" | grep -vE '"app/[a-z_]+\.h"|<(stdint|stdbool|stddef|limits)\.h>' | head -n 1 || true)
 if [ -n "$first" ]; then
     echo "foc33: ${first#*:} in $shown: an application sees app/ alone; what it may know and ask is in include/app/app.h" >&2
