@@ -252,7 +252,12 @@ void kept_tick(uint16_t elapsed_ms)
 {
     const uint16_t request = kept_command.request;
     kept_command.request = 0;
-    kept_coasts_ms = (uint16_t)((P1OVDCON != BOARD_OUTPUTS_OFF) ? KEPT_COAST_MS : (kept_coasts_ms != 0u) ? kept_coasts_ms - 1u : 0u);
+    if (P1OVDCON != BOARD_OUTPUTS_OFF) {
+        kept_coasts_ms = KEPT_COAST_MS;
+    } else if (kept_coasts_ms != 0u) {
+        kept_coasts_ms--;
+    } else { /* the rotor stands */
+    }
     kept_since_ms = (uint16_t)(kept_since_ms + elapsed_ms);
     if (request == (uint16_t)KEPT_ASK_KEEP || request == (uint16_t)KEPT_ASK_FORGET) {
         kept_command.result = kept_serve(request);
