@@ -87,6 +87,39 @@ def test_the_page_fits_its_window_no_control_lies_on_another_and_curves_are_wide
     assert [place for place in places if place[1] < 0 or place[3] > width + 0.5] == [] and page.run("return document.documentElement.scrollWidth") <= width
 
 
+@pytest.mark.parametrize("width", [360, 1280])
+def test_a_refusal_and_a_fault_stay_in_sight_wherever_one_has_scrolled_to(page, width):
+    resized(page, width)
+    seen = """(() => { const r = by("notices").getBoundingClientRect(), top = document.elementFromPoint(r.left + 20, r.top + 12);
+        return [scrollY > 300, r.top >= 0 && r.bottom <= innerHeight, by("notices").contains(top)]; })()"""
+    page.run("scrollTo(0, document.body.scrollHeight)")
+    assert inside(page, f"tell(''); {seen}")[:2] == [True, False]
+    assert inside(page, f"tell('a refusal'); {seen}") == [True, True, True]
+    assert inside(page, f"tell(''); views.drive.fault('OVERCURRENT'); {seen}") == [True, True, True]
+    inside(page, "views.drive.fault('NONE')")
+    page.run("scrollTo(0, 0)")
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_all_numbers_of_the_traces_are_within_the_window(page, width):
+    resized(page, width)
+    traced(page)
+    cut = scope_open(page, then="""(() => { const box = by("scope-numbers").getBoundingClientRect(); return [...by("scope-numbers").querySelectorAll("th, td")].map((e) => [e.textContent, e.getBoundingClientRect()])
+        .filter(([, r]) => r.left < box.left - 1 || r.right > box.right + 1).map(([text]) => text).concat(by("scope-numbers").scrollWidth > by("scope-numbers").clientWidth ? ["wide"] : []); })()""")
+    count = inside(page, "by('scope-numbers').querySelectorAll('[role=cell], [role=columnheader]').length")
+    scope_open(page, False)
+    assert cut == [] and count >= 15
+
+
+def test_the_panels_are_higher_where_the_window_has_room(page):
+    traced(page)
+    heights = []
+    for width, height in ((1280, 800), (2560, 800), (2560, 1440)):
+        resized(page, width, height)
+        heights.append(page.run("return [...document.querySelectorAll('#strips .graph, #scope-graphs .graph')].map((e) => e.clientHeight)"))
+    assert all(min(b - a for a, b in zip(low, high)) > 15 for low, high in zip(heights, heights[1:])), heights
+
+
 @pytest.mark.parametrize("width", WIDTHS)
 def test_no_control_moves_when_the_record_of_a_fault_comes_and_its_cause_has_room(page, width):
     resized(page, width)

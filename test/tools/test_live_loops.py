@@ -153,7 +153,7 @@ def test_a_step_of_the_running_motor_is_as_the_model_says_and_nobody_has_lost_th
     if name == "load":
         assert 0.9 * model["peak"] < measured["peak"] < model["peak"] + 55.0 / 1400.0 and measured["settled_s"] is not None
     else:
-        assert abs(measured["rise_s"] / model["rise_s"] - 1.0) < 0.3 and measured["peak"] < peak and 0.0 < told["ripple"] < 0.05
+        assert abs(measured["rise_s"] / model["rise_s"] - 1.0) < 0.3 and measured["peak"] < peak and 0.0 < told["ripple"] < 0.1
     assert bool(told["note"]) == (name == "current")
     after = living.maker.call(lambda: living.board.frame()["now"]).result(5)
     assert after["target_rpm"] == pytest.approx(before["target_rpm"], abs=10.0) and living.board.board.get(BRAKE) == living.board.settings[BRAKE] and living.board.state == "CLOSED"
@@ -353,19 +353,19 @@ def test_the_keyboard_alone_measures_and_cancels_and_the_curve_grows(page, chrom
     page.state("STOPPED")
 
 
-@pytest.mark.parametrize("width", [390, 1280])
-def test_the_panel_fits_its_window_with_all_that_it_says(page, width):
+@pytest.mark.parametrize("width, whole", [(width, WHOLE) for width in (360, 390, 768, 1280, 2560)] + [(360, WHOLE.replace("2.4 * 42", "160 * 24").replace("24.8]", "990]").replace("24.7]", "985]")), (1280, WHOLE.replace("2.4 * 42", "160 * 24").replace("24.8]", "990]").replace("24.7]", "985]"))],
+                         ids=lambda item: item if isinstance(item, int) else "low" if item == WHOLE else "high")
+def test_the_panel_fits_its_window_with_all_that_it_says(page, width, whole):
     resized(page, width)
-    places = inside(page, WHOLE + ";" + PLACES)
-    assert page.run("return document.documentElement.scrollWidth") <= width and overlapping(places) == [] and {"loops-numbers", "save-loop"} <= {place[0] for place in places}
+    places = inside(page, whole + ";" + PLACES)
+    assert page.run("return document.documentElement.scrollWidth") <= width and overlapping(places) == [] and {"loops-numbers", "save-loop", "measure-step", "step-size", "save-step"} <= {place[0] for place in places}
     wide = page.run("""return [...document.querySelectorAll("#loops-card *")].filter((e) => e.clientWidth && !e.closest("svg") && e.scrollWidth > e.clientWidth + 1).map((e) => e.id || e.tagName)""")
-    outside = page.run("""const box = document.getElementById("loops-plot").getBoundingClientRect();
-        return [...document.querySelectorAll("#loops-plot *")].filter((e) => { const r = e.getBoundingClientRect(); return r.left < box.left - 1 || r.right > box.right + 1 || r.top < box.top - 1 || r.bottom > box.bottom + 1; })
+    outside = page.run("""return [...document.querySelectorAll(".plot *")].filter((e) => { const r = e.getBoundingClientRect(), box = e.ownerSVGElement.getBoundingClientRect(); return r.left < box.left - 1 || r.right > box.right + 1 || r.top < box.top - 1 || r.bottom > box.bottom + 1; })
             .map((e) => e.outerHTML)""")
     assert wide == [] and outside == []
-    labels = page.run("return [...document.querySelectorAll('#loops-plot text')].map((e) => e.textContent)")
-    assert {"0", "-180", "-90", "gain [dB]", "phase [°]", "Hz", "5", "10"} <= set(labels)
-    apart = page.run("""const boxes = [...document.querySelectorAll("#loops-plot text")].map((e) => e.getBoundingClientRect());
+    labels = page.run("return [...document.querySelectorAll('.plot text')].map((e) => e.textContent)")
+    assert {"0", "-180", "-90", "gain [dB]", "phase [°]", "Hz", "100", "ms", "change, of the step [%]"} | ({"5", "10"} if whole == WHOLE else {"500", "1000"}) <= set(labels)
+    apart = page.run("""const boxes = [...document.querySelectorAll(".plot text")].map((e) => e.getBoundingClientRect());
         return boxes.flatMap((a, n) => boxes.slice(n + 1).filter((b) => a.left < b.right && b.left < a.right && a.top + 2 < b.bottom && b.top + 2 < a.bottom)).length""")
     assert apart == 0
 
@@ -378,10 +378,31 @@ def test_the_plot_and_the_tables_say_what_was_measured(page):
         ["", "phase margin", "crossover"], ["measured", "55.8°", "24.8 Hz"], ["tuner's model", "51.3°", "24.7 Hz"], ["difference", "4.5°, more than 3°", "0 %"]]
     rows = page.run("return [...document.querySelectorAll('#loops-numbers tr')].map((row) => [...row.children].map((cell) => cell.textContent))")
     assert len(rows) == 26 and rows[1] == ["2.516", "29.9", "29.4", "-183.1", "-185.1"] and rows[4][2] == "24.3" and rows[3][4] == "-179.7", rows[1:5]
+    assert page.run("return [...document.querySelectorAll('#step-figures tr')].map((row) => [...row.children].map((cell) => cell.textContent))") == [
+        ["", "rise time", "overshoot", "settled in"], ["measured", "28.7 ms", "1.5 %", "33.8 ms"], ["tuner's model", "28.4 ms", "0.0 %", "not in the record"], ["ripple before it, RMS", "", "0.5 %", ""]]
+    assert page.text("#step-said") == "step of the speed: mean of 8 steps" and page.run("return document.querySelectorAll('#step-plot path').length") == 2
     assert page.text("#loops-note") == FOLLOWS and page.text("#loops-margins caption") == "Open current loop at 1474 rpm"
     y = inside(page, """(() => { const at = (s) => [...document.querySelectorAll(`#loops-plot ${s}`)]; const label = (text) => at("text").filter((e) => e.textContent === text);
         return [at(".limit").map((e) => e.y1.baseVal.value), [label("0")[0], label("-180")[0]].map((e) => e.y.baseVal[0].value - 4)]; })()""")
     assert y[0] == pytest.approx(y[1], abs=0.1)
+
+
+def test_results_of_other_parameters_are_marked_until_they_are_measured_again(page):
+    said = inside(page, WHOLE + """; const now = (old) => { views.loops.show({ measurable: { ...foc33.frame.measurable, old } }); return [by("loops-said"), by("step-said")].map((e) => [e.textContent, e.className]); };
+        [now(["loop"]), now(["step"]), now([])]""")
+    changed = ": a parameter has changed since: measure again"
+    assert said == [[["current loop: 25 points measured" + changed, "old"], ["step of the speed: mean of 8 steps", ""]],
+                    [["current loop: 25 points measured", ""], ["step of the speed: mean of 8 steps" + changed, "old"]],
+                    [["current loop: 25 points measured", ""], ["step of the speed: mean of 8 steps", ""]]]
+
+
+def test_a_size_that_cannot_be_is_refused_at_its_field(page):
+    size = page.one("#step-size")
+    for text, wrong in (("200", True), ("", True), ("fast", True), ("1e1", False)):
+        inside(page, f"by('step-kind').value = 'load'; by('step-kind').onchange(); by('step-size').value = {text!r}; by('measure-step').disabled = false; by('measure-step').click()")
+        assert ("wrong" in size.get_attribute("class")) == wrong
+        if wrong:
+            assert page.text("#message") == f"step: '{text}' is impossible: choose 5 .. 100 % of the rated torque"
 
 
 @SEEN

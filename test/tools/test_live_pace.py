@@ -1,10 +1,11 @@
 """The pace of make live: twenty frames a second in real time, slower where the machine is, and never a rush to catch up."""
 
+import numpy as np
 import pytest
 from support import refusal
 
 from tools.common.errors import UserError
-from tools.live.pace import BEHIND_S, FRAME_S, Pacemaker, RealTime
+from tools.live.pace import BEHIND_S, FRAME_S, QUICK_SLICES, SLICES, Pacemaker, RealTime
 
 
 class Clock:
@@ -23,8 +24,10 @@ class Board:
     def __init__(self, clock: Clock, work_s: float = 0.002) -> None:
         self.clock, self.work_s, self.time_s, self.told_pace = clock, work_s, 0.0, 1.0
         self.begins: list[float] = []
+        self.hurries, self.pieces = False, 0
 
     def run(self, seconds: float) -> None:
+        self.pieces += 1
         if self.work_s < 0.0:
             raise ValueError("the supply is gone")
         self.time_s += seconds
@@ -53,6 +56,16 @@ def lived(frames: int, board_of, pace: float = 1.0, happens=lambda maker, number
     maker.serve = lambda until: (Pacemaker.serve(maker, clock.now_s), setattr(clock, "now_s", max(clock.now_s, until)))
     maker._live()
     return board, published, maker
+
+
+@pytest.mark.parametrize("hurries, pieces", [(False, SLICES), (True, QUICK_SLICES)])
+def test_a_board_that_hurries_runs_in_smaller_pieces_with_as_many_frames(hurries, pieces):
+    def of(clock: Clock) -> Board:
+        board = Board(clock, 0.0005)
+        board.hurries = hurries
+        return board
+    board, published, _ = lived(21, of)
+    assert board.pieces == 21 * pieces and published[-1]["t"] == pytest.approx(21 * FRAME_S) and np.diff(board.begins) == pytest.approx(FRAME_S)
 
 
 @pytest.mark.parametrize("pace", [1.0, 0.1, 0.001])

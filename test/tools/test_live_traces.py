@@ -98,10 +98,20 @@ def test_a_frequency_is_that_of_the_signal(page, values, hz):
     assert measured(page, "frequency", values) == pytest.approx(hz, rel=0.02)
 
 
+WALK = np.cumsum(np.random.default_rng(3).normal(size=(40, 100)), axis=1)
+"""Forty speeds that wander."""
+
+
 @pytest.mark.parametrize("values", [np.full(200, 2.0), TIME, np.sin(2 * np.pi * 40.0 * TIME), np.sin(2 * np.pi * (100.0 + 20000.0 * TIME) * TIME)],
                          ids=["constant", "ramp", "less than a period", "changing"])
 def test_what_has_no_frequency_gets_none(page, values):
     assert measured(page, "frequency", values) is None
+
+
+def test_noise_has_no_frequency(page):
+    series = [*WALK, *np.random.default_rng(4).normal(size=(40, 100)), *np.random.default_rng(5).integers(0, 2, size=(20, 100)).astype(float)]
+    found = inside(page, f"{json.dumps([one.tolist() for one in series])}.map((row) => measure.frequency(row.map((y, n) => [n * {STEP_S}, y])))")
+    assert [hz for hz in found if hz is not None] == []
 
 
 def test_nothing_is_computed_of_nothing(page):

@@ -22,6 +22,8 @@ class AtPort:
 
     SILENT_S = 1.0
     """So long without a word, and the page says so."""
+    hurries = False
+    """Its line is its own."""
 
     def __init__(self, port: Any, title: str) -> None:
         self.port, self.title = port, title

@@ -15,6 +15,8 @@ FRAMES_PER_S = 20
 FRAME_S = 1.0 / FRAMES_PER_S
 SLICES = 5
 """Of a frame's time; between them characters of the serial line change hands."""
+QUICK_SLICES = 25
+"""While a step is measured: between the two words that make it the reference's ramp goes on."""
 LEAST_SLICE_S = 0.001
 BEHIND_S = 0.25
 """What a board makes up for; else it would run too fast after a while in which the machine was busy."""
@@ -39,7 +41,7 @@ class RealTime:
 
 
 class Pacemaker:
-    """`board` has run(seconds), paced(pace), frame() and time_s; each frame, with its pace, goes to `publish`."""
+    """`board` has run(seconds), paced(pace), frame(), time_s and hurries; each frame, with its pace, goes to `publish`."""
 
     def __init__(self, board: Any, publish: Callable[[dict[str, Any]], None], pace: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
         self.board, self.publish, self.pace, self.clock = board, publish, pace, clock
@@ -90,7 +92,7 @@ class Pacemaker:
     def frame(self, real_time: RealTime) -> None:
         """The time of one frame passes, in slices."""
         seconds = FRAME_S * self.pace
-        slices = max(1, min(SLICES, round(seconds / LEAST_SLICE_S)))
+        slices = max(1, min(QUICK_SLICES if self.board.hurries else SLICES, round(seconds / LEAST_SLICE_S)))
         for number in range(1, slices + 1):
             self.board.run(seconds / slices)
             if number == slices:

@@ -91,6 +91,13 @@ def _unmeasured(driver: Any) -> None:
     _slide(driver, "load.constant_nm", 0.05)
 
 
+def _stepped(driver: Any) -> None:
+    """Steps of the speed."""
+    _choose(driver, "step-kind", "speed")
+    _click(driver, "#measure-step")
+    _until(driver, "document.getElementById('step-said').textContent.includes('mean of')")
+
+
 def _tuned(driver: Any) -> None:
     """Two parameters of the control loops are changed."""
     driver.execute_script("const s = document.getElementById('tuning-subject'); s.value = [...s.options].find((o) => o.text === 'Control loops').value; s.onchange()")
@@ -141,6 +148,8 @@ def _write() -> int:
                 _measured(driver)
                 _save_part(driver, "live-scope", "#scope-card")
                 _unmeasured(driver)
+                _stepped(driver)
+                _save_part(driver, "live-step", "#loops-card")
                 _faulty(driver)
                 _save(driver, "live-fault", SMALL)
             with _page(driver, "--defines=-DPARAMS_IN_RAM"):

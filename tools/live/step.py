@@ -24,7 +24,7 @@ BEFORE = 0.1
 SETTLED = {"current": 0.1, "speed": 0.1, "load": 0.02}
 """Of the step, of the load's: of the speed."""
 QUARTER = 16384
-REST_S, UNLOADED_S = 0.5, 1.0
+REST_S, UNLOADED_S, BACK_S = 0.5, 1.0, 20.0
 LEFT_STEPS = 100
 """Slow steps that the current's step lasts."""
 
@@ -131,9 +131,18 @@ def speed(bench: Bench, seconds: float, step: float = SPEED_STEP, told: Told = l
         share = (erpm - first) / (target - before)
         records.append((time_s - _begin(time_s, share), share))
         bench.aim(before)
-        bench.pause(seconds)
+        _comes_back(bench, reference, before)
         told(done + 1)
     return _mean(records)
+
+
+def _comes_back(bench: Bench, reference: str, before: int) -> None:
+    """Until the reference's ramp is at its end, and the speed with it."""
+    end_s = BACK_S
+    while bench.firmware.get(reference) != before and end_s > 0.0:
+        bench.pause(POLL_S)
+        end_s -= POLL_S
+    bench.pause(REST_S)
 
 
 def load(bench: Bench, seconds: float, put: Callable[[bool], None], told: Told = lambda done: None) -> tuple[np.ndarray, np.ndarray]:

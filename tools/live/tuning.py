@@ -33,7 +33,7 @@ except ImportError:
     pass # program.reading() says so
 
 BASE = "board_params"
-FIXED = "The parameters are constants of this firmware. DEFINES=-DPARAMS_IN_RAM makes them variables, here and in the image."
+FIXED = "The parameters are constants of this firmware. DEFINES=-DPARAMS_IN_RAM makes them variables here; an image needs DEFINES=\"-DPARAMS_IN_RAM -DSCOPE=1\"."
 BOARD, LATER, NOWHERE = "board", "build", "unused"
 """Where a changed value is: in the board; in the saved header alone, for it needs a build; there alone, for this build does not ask for it."""
 LOOK_S = 1.0

@@ -98,6 +98,11 @@ class VirtualBoard:
             if part is not None:
                 part.beat(link)
 
+    @property
+    def hurries(self) -> bool:
+        """Characters of the line must not wait."""
+        return self.loops is not None and self.loops.borrows
+
     def paced(self, pace: float) -> None:
         """So much slower everything is answered, too."""
         if self.scope is not None:

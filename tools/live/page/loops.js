@@ -7,7 +7,7 @@ class LoopsView {
   static BOTTOM = 20; // and for the frequencies
   static GAIN_STEP = 10; // dB from line to line; 20 where there are many
   static PHASE_STEP = 45;
-  static LEAST_LABELS_PX = 24;
+  static LEAST_LABELS_PX = 34;
 
   constructor({ loops }, send) {
     by("loops-card").hidden = !loops;

@@ -77,7 +77,7 @@ function take(message) {
 
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { views?.strips.fit(); views?.scope.fit(); });
 
-addEventListener("resize", () => views?.loops.draw());
+addEventListener("resize", () => { views?.loops.draw(); views?.scope.resized(); });
 
 by("power").addEventListener("click", () => link.send({ power: true }));
 by("pace").addEventListener("change", () => { paceBusy = performance.now() + 500; link.send({ pace: Number(by("pace").value) }); });

@@ -2,6 +2,8 @@
 const measure = {
   HYSTERESIS: 0.1, // of the curve's span: less is no crossing
   UNEVEN: 1.5, // no frequency where one period is so much longer than another
+  LIKE: 0.9, // nor where the curve correlates less with itself a period later: noise crosses its middle, too
+  OVERLAP: 0.5, // of a period, that the curve must have beyond it
   FINER: 4, // the spectrum's points are so much closer than its lines: a peak between two lines keeps its height
 
   mean: (points) => points.length ? points.reduce((sum, point) => sum + point[1], 0) / points.length : null,
@@ -17,7 +19,18 @@ const measure = {
       if (armed && under < middle && y >= middle) { at.push(before + (x - before) * (middle - under) / (y - under)); armed = false; }
     }
     const periods = at.slice(1).map((x, n) => x - at[n]);
-    return periods.length && Math.max(...periods) <= measure.UNEVEN * Math.min(...periods) ? periods.length / (at.at(-1) - at[0]) : null;
+    if (!periods.length || Math.max(...periods) > measure.UNEVEN * Math.min(...periods)) { return null; }
+    const period = (at.at(-1) - at[0]) / periods.length, step = (points.at(-1)[0] - points[0][0]) / (points.length - 1);
+    return measure.likeness(values, Math.round(period / step)) >= measure.LIKE ? 1 / period : null;
+  },
+
+  // Of a curve and itself so many points later: the correlation; 0 where too little is left to tell.
+  likeness(values, later) {
+    const count = values.length - later;
+    if (count < measure.OVERLAP * later) { return 0; }
+    const [one, other] = [values.slice(0, count), values.slice(later)].map((part) => { const mean = part.reduce((sum, v) => sum + v, 0) / count; return part.map((v) => v - mean); });
+    const product = (a, b) => a.reduce((sum, v, n) => sum + v * b[n], 0);
+    return product(one, other) / (Math.sqrt(product(one, one) * product(other, other)) || 1);
   },
 
   // Amplitudes over hertz, with a Hann window: a sine has its peak value; the mean is taken off.

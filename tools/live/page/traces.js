@@ -3,6 +3,7 @@ class TracesView {
   static COLORS = ["d", "q", "true", "estimate", "bad", "reference", "leaf", "rose"];
   static PREFIXES = ["board_drive.run.", "board_drive."]; // left out where a name is shown
   static HEIGHT = 190;
+  static TALL = 1200; // a window that has room for more
   static LEAST_HEIGHT = 66; // of a panel: three labels
   static ANGLE = "°"; // it wraps: its mean is none
   static kept = null; // the reference; it stays when the connection is opened again
@@ -124,6 +125,16 @@ class TracesView {
     };
   }
 
+  // All panels together.
+  static room() { return TracesView.HEIGHT * (window.innerWidth < 1800 ? 1 : window.innerHeight < TracesView.TALL ? 2 : 3); }
+
+  // The window is another one.
+  resized() {
+    if (this.room === TracesView.room()) { return; }
+    this.layout = "";
+    this.refresh();
+  }
+
   // Light or dark.
   fit() {
     this.update((n) => ({ colors: this.graphs[n].members.map((m) => tint(this.curves[m].color)), ...look() }));
@@ -132,8 +143,8 @@ class TracesView {
   panel(unit, last, count) {
     const members = this.trace.units.flatMap((other, n) => other === unit ? [n] : []), box = make("div", { className: "strip" }, by("scope-graphs"));
     const head = make("div", { className: "head" }, box), place = make("div", { className: "graph" }, box);
-    const room = TracesView.HEIGHT * (window.innerWidth >= 1800 ? 2 : 1);
-    place.style.height = `${Math.max(TracesView.LEAST_HEIGHT, Math.round(room / count)) + (last ? 18 : 0)}px`;
+    this.room = TracesView.room();
+    place.style.height = `${Math.max(TracesView.LEAST_HEIGHT, Math.round(this.room / count)) + (last ? 18 : 0)}px`;
     const legend = make("div", { className: "legend" }, head);
     if (!window.Dygraph) { return { members, unit }; }
     const graph = new Dygraph(place, [[0, ...members.map(() => 0)]], {
@@ -265,17 +276,17 @@ class TracesView {
     const text = (value) => value === null || value === undefined ? "–" : String(Math.abs(value) < 0.001 ? Number(value.toFixed(6)) : Number(value.toPrecision(4)));
     const at = (curve, x) => curve.points.length ? curve.points.find((point) => point[0] === this.nearest(x, curve.points.map((one) => one[0])))[1] : null;
     const titles = [on && this.view === "time" ? "between A and B" : "of what is shown", ...(on ? ["A", "B", "B − A"] : []), "mean", "RMS", this.view === "time" ? "frequency" : "peak at"];
-    const beside = (name) => this.curves.filter((curve) => curve.name === name), head = make("tr"), rows = this.trace.names.flatMap(beside).map((curve) => {
+    const beside = (name) => this.curves.filter((curve) => curve.name === name), head = make("tr", { role: "row" }), rows = this.trace.names.flatMap(beside).map((curve) => {
       const gate = on && this.view === "time" ? TracesView.between(curve.time, Math.min(a, b), Math.max(a, b)).map(([x, y]) => [x / 1000, y]) : curve.seconds;
       const [y1, y2] = on ? [at(curve, a), at(curve, b)] : [], wraps = curve.unit === TracesView.ANGLE;
       const frequency = this.view === "time" ? measure.frequency(gate) : measure.peak(curve.points);
-      const row = make("tr"), name = make("th", { scope: "row", textContent: curve.kept ? "reference" : `${this.short(curve.name)}${curve.unit && ` [${curve.unit}]`}` }, row);
+      const row = make("tr", { role: "row" }), name = make("th", { scope: "row", role: "rowheader", textContent: curve.kept ? "reference" : `${this.short(curve.name)}${curve.unit && ` [${curve.unit}]`}` }, row);
       name.style.color = `var(--${curve.color})`;
       const cells = [...(on ? [y1, y2, y1 === null ? null : y2 - y1] : []), wraps ? null : measure.mean(gate), wraps ? null : measure.rms(gate)].map(text);
-      for (const cell of [...cells, frequency === null ? "–" : `${text(frequency)} Hz`]) { make("td", { textContent: cell }, row); }
+      for (const cell of [...cells, frequency === null ? "–" : `${text(frequency)} Hz`]) { make("td", { role: "cell", textContent: cell }, row); }
       return row;
     });
-    titles.forEach((title, n) => make(n ? "th" : "td", n ? { scope: "col", textContent: title } : { textContent: title }, head));
+    titles.forEach((title, n) => make(n ? "th" : "td", n ? { scope: "col", role: "columnheader", textContent: title } : { role: "cell", textContent: title }, head));
     by("scope-numbers").firstElementChild.replaceChildren(head, ...rows);
   }
 
