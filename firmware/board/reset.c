@@ -20,8 +20,7 @@ void reset_keep(uint16_t fault)
 
 drive_fault_t reset_take(void)
 {
-    uint16_t cause = selftest_reset_cause(RCON);
-    uint16_t fault;
+    uint16_t cause = selftest_reset_cause(RCON), fault;
     RCON = 0;
     board_reset_cause = cause;
     served_tick = 0;

@@ -3,8 +3,7 @@
 
 INLINE sincos_t trig_sincos(angle_t angle)
 {
-    uint16_t nearest = (uint16_t)(angle + 256u);
-    uint16_t step = (uint16_t)(nearest >> 9) & (TRIG_SIN_ENTRIES - 1u);
+    uint16_t nearest = (uint16_t)(angle + 256u), step = (uint16_t)(nearest >> 9) & (TRIG_SIN_ENTRIES - 1u);
     q15_t s = trig_sin_table[step];
     q15_t c = trig_sin_table[step ^ (TRIG_SIN_ENTRIES / 2u)]; /* a quarter of a turn away, to the one side or the other */
     /* the low nine bits as a signed fraction of one step, then in radians * 65536: 2 pi / 128 / 2 * 65536 / 32768 */

@@ -73,8 +73,7 @@ INLINE speed_erpm_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kf
 
 INLINE void estimator_pll(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, dq_t e_q12)
 {
-    int16_t e_d = qm_lowpass(&e->e_d_q28, e_q12.d, t->kfilter_esdq_q16);
-    int16_t e_q = qm_lowpass(&e->e_q_q28, e_q12.q, t->kfilter_esdq_q16);
+    int16_t e_d = qm_lowpass(&e->e_d_q28, e_q12.d, t->kfilter_esdq_q16), e_q = qm_lowpass(&e->e_q_q28, e_q12.q, t->kfilter_esdq_q16);
     int16_t sum = (int16_t)(e_q - e->sign * e_d);
     int32_t step_q32;
     e->omega_before_erpm = e->omega_erpm;

@@ -39,8 +39,7 @@ INLINE void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16
     int16_t a = qm_mulhi_su(v.alpha, duty_per_volt_q16);
     int16_t t = qm_mulhi_su(qm_mulhi_su(v.beta, duty_per_volt_q16), 56756u); /* sqrt(3)/2 */
     int16_t half = (int16_t)(a >> 1);
-    int16_t b = (int16_t)(t - half);
-    int16_t c = (int16_t)(-t - half);
+    int16_t b = (int16_t)(t - half), c = (int16_t)(-t - half);
     int16_t max = a, min = a, shift;
     if (b > max) {
         max = b;

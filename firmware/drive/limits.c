@@ -243,8 +243,7 @@ int16_t bus_sample(int16_t v_bus_raw)
 
 void bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus_raw)
 {
-    int16_t now_q15 = bus_sample(v_bus_raw);
-    int16_t bus_q15 = qm_lowpass(&d->bus_q31, now_q15, 16384);
+    int16_t now_q15 = bus_sample(v_bus_raw), bus_q15 = qm_lowpass(&d->bus_q31, now_q15, 16384);
     protection_check_bus(d, p, now_q15, bus_q15);
     bus_update_gain(d, p, now_q15);
 }

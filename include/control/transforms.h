@@ -6,14 +6,12 @@
 
 /** A vector in the stator frame; the unit is that of its user. */
 typedef struct {
-    int16_t alpha;
-    int16_t beta;
+    int16_t alpha, beta;
 } alphabeta_t;
 
 /** A vector in a rotating frame. */
 typedef struct {
-    int16_t d;
-    int16_t q;
+    int16_t d, q;
 } dq_t;
 
 /** A current of each phase. */

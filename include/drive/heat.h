@@ -32,9 +32,8 @@ typedef struct {
     uint16_t broken;    /**< samples at an end of the range, less those that are not; NTC_BROKEN_SAMPLES at most */
 } ntc_t;
 
-/** Temperature for a share of the reference: within 1.5 K of the Beta equation between -20 and 120 degrees, within 2 K between -40 and 152, and these at the
- *  ends, for each sensor that the build accepts.
- *  @return degrees Celsius * 16 */
+/** Temperature for a share of the reference: within 1.5 K of the Beta equation between -20 and 120 degrees, within 2 K between -40 and 152, and these at
+ *  the ends, for each sensor that the build accepts. @return degrees Celsius * 16 */
 int16_t ntc_celsius(const ntc_params_t *p, uint16_t share_q16);
 
 /** A sample of the sensor's own input. @param sample_q15 signed fractional */

@@ -149,8 +149,7 @@
 
 /** X(name): what userparams.h may define, too; otherwise drive/param_scaling.h computes it. */
 #define PARAM_OPTIONAL(X) \
-    X(BRIDGE_RS_OHM) \
-    X(D_CURRCNTR_PTERM) X(D_CURRCNTR_ITERM) X(D_CURRCNTR_CTERM) \
+    X(BRIDGE_RS_OHM) X(D_CURRCNTR_PTERM) X(D_CURRCNTR_ITERM) X(D_CURRCNTR_CTERM) \
     X(Q_CURRCNTR_PTERM) X(Q_CURRCNTR_ITERM) X(Q_CURRCNTR_CTERM) X(SPEEDCNTR_PTERM)
 
 /** Parameters in these units are whole numbers. */

@@ -9,8 +9,7 @@
 #ifndef SELFTEST_OFF
 /** Complements of the drive's fields of the same name, and the sum of the slots that came to their end. */
 typedef struct {
-    uint16_t state, fault, direction, offset_a, offset_b;
-    uint16_t phases;
+    uint16_t state, fault, direction, offset_a, offset_b, phases;
 } selftest_state_t;
 
 /** Member of drive_t. */

@@ -249,8 +249,7 @@ static void resistance_done(drive_t *d, const drive_params_t *p)
 {
     identify_t *id = &d->run.identify;
     soft_float_t bus = soft_float_div(soft_float_of((uint32_t)id->bus_first), soft_float_of((uint32_t)id->sum[3]));
-    int32_t duty_first = soft_float_times(id->duty_first, bus);
-    int32_t duty = duty_first - id->sum[0], i = id->i_first - id->sum[1];
+    int32_t duty_first = soft_float_times(id->duty_first, bus), duty = duty_first - id->sum[0], i = id->i_first - id->sum[1];
     if (!rests(d, id->sum[1] + 2 * id->sum[2])) {
         return;
     }

@@ -46,13 +46,10 @@
 /** Innovation at which the load changes by 16000 units in a step: both words of its product are full. */
 #define PARAM_INNOVATION_MAX PARAM_MIN(16383.0F, 16000.0F * 65536.0F * 65536.0F / (PARAM_QUICK_Q16 * PARAM_QUICK_Q16) / (float)(1L << PARAM_ACCEL_SHIFT))
 
-/** Mean innovation of a load, in Kt/J i / r with the i of MAXIMUM_CURRENT_A. One that swings between nothing and all of it, i/2 sin wt, where the
- *  observer is worst, w = r: 1/2 / 2, and 2/pi of that in the mean. A step to all of it: t r exp(-r t), at most 1/e; the innovation opens the gate,
- *  which ends it within WRONG_SEC unless the observer is slow. */
-#define PARAM_LOAD_MEAN \
-    PARAM_MAX(0.5F / PARAM_PI, PARAM_MIN(0.36788F, 1.0F / (2.0F * PARAM_PI * PARAM_F(LOAD_BANDWIDTH_HZ) * PARAM_F(WRONG_SEC))))
-#define PARAM_LOAD_ERPM \
-    PARAM_MIN(PARAM_ACCEL *PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) * PARAM_LOAD_MEAN / (PARAM_LOADED_Q16 / 65536.0F), 32767.0F)
+/** Mean innovation of a load, in Kt/J i / r with the i of MAXIMUM_CURRENT_A. One that swings between 0 and i where the observer is worst, at w = r:
+ *  1/2 / 2, and 2/pi of that in the mean. A step to i: t r exp(-r t), at most 1/e; it opens the gate, which ends it within WRONG_SEC if not slow. */
+#define PARAM_LOAD_MEAN PARAM_MAX(0.5F / PARAM_PI, PARAM_MIN(0.36788F, 1.0F / (2.0F * PARAM_PI * PARAM_F(LOAD_BANDWIDTH_HZ) * PARAM_F(WRONG_SEC))))
+#define PARAM_LOAD_ERPM PARAM_MIN(PARAM_ACCEL *PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A)) * PARAM_LOAD_MEAN / (PARAM_LOADED_Q16 / 65536.0F), 32767.0F)
 
 /* A speed's angle is rounded as the estimator rounds it. */
 #define PARAM_OBSERVER_INIT \
