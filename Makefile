@@ -384,7 +384,7 @@ modes := $(shell sed -n 's/^ *X.\([A-Z_]*\), .*/\1/p' include/drive/modes/mode_t
 # The longest first, so that none of them is left alone at the end. Quick is what the edit loop of firmware and bench needs: no tuner, no sweeps, no search for a parameter's ends.
 slow_suites := $(filter $(addprefix tools/test_,any_motor spreadsheet tune_% fw_tune identify robust loadsteps sensitivity image_build examples progress recipes bench_pages userparams import live_% make_% campaign setup suites),$(bench_py))
 # Have tests for a release alone, with every motor and every mode.
-release_suites = tools/test_tune_remedies $(addprefix behaviour/test_,identify_motors identify_ranges low_speeds) tools/test_live_layout $(if $(shell command -v $(xc16)gcc),image/test_modes)
+release_suites = tools/test_tune_remedies $(addprefix behaviour/test_,identify_motors identify_ranges low_speeds) tools/test_live_layout tools/test_live_loops $(if $(shell command -v $(xc16)gcc),image/test_modes)
 longest := $(slow_suites) $(addprefix behaviour/test_,identify_motors fw_search)
 quick_suites := $(filter-out golden/% unit/test_param_ranges,$(source_py)) $(filter-out $(slow_suites),$(filter tools/%,$(bench_py))) $(unit_c) $(board_c)
 all_suites := $(filter-out tools/test_tune_remedies,$(tools_py) $(longest) $(filter-out $(longest),$(bench_py))) $(source_py) $(behaviour_c) $(unit_c) $(board_c)

@@ -94,7 +94,8 @@ def resized(page: Page, width: int, height: int = 800) -> None:
     page.run("return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
-SEEN = pytest.mark.parametrize("on, width", [(False, 1280), (True, 390)], ids=["light", "dark phone"])
+SEEN = pytest.mark.parametrize("on, width", [pytest.param(on, width, id=f"{'dark' if on else 'light'} {width}", marks=[] if (on, width) in ((False, 1280), (True, 390)) else [pytest.mark.release])
+                                             for width in (360, 390, 768, 1280, 2560) for on in (False, True)])
 """As a page is looked at for accessible()."""
 
 

@@ -5,6 +5,7 @@ import csv
 import ctypes
 import io
 import itertools
+import json
 import time
 
 import pytest
@@ -18,6 +19,7 @@ from tools.live.loop_response import FOLLOWS, LoopResponse
 from tools.live.pace import Pacemaker
 from tools.live.recording import Origin
 from tools.live.response_model import COLUMNS, WITHIN_DEG, gains_of
+from tools.live.step_response import NO_BRAKE
 from tools.live.symbols import Symbols
 from tools.live.virtual_board import VirtualBoard
 
@@ -403,6 +405,13 @@ def test_a_size_that_cannot_be_is_refused_at_its_field(page):
         assert ("wrong" in size.get_attribute("class")) == wrong
         if wrong:
             assert page.text("#message") == f"step: '{text}' is impossible: choose 5 .. 100 % of the rated torque"
+
+
+def test_why_a_step_cannot_be_measured_stands_there_as_soon_as_it_is_chosen(page):
+    why = {"speed": None, "current": None, "step current": None, "step speed": None, "step load": NO_BRAKE}
+    shown = [inside(page, f"by('step-kind').value = '{kind}'; by('step-kind').onchange(); views.loops.show({{ measurable: {{ why: {json.dumps(why)}, old: [] }} }}); [by('measure-step').disabled, by('loops-why').textContent]")
+             for kind in ("load", "speed")]
+    assert shown[0] == [True, NO_BRAKE] and shown[1][0] is False
 
 
 @SEEN

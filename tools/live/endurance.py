@@ -8,6 +8,7 @@ import contextlib
 import json
 import math
 import os
+import statistics
 import subprocess
 import sys
 import threading
@@ -60,15 +61,19 @@ class Found:
     board: float
     frames_per_s: float
     """of the slowest tab"""
-    growth_mb: float
-    """of what has grown most, server or tab"""
 
     @staticmethod
     def of(first: Row, last: Row) -> "Found":
         """Shares of a core."""
         seconds, board_s = last.at_s - first.at_s, last.board_s - first.board_s
-        return Found((last.process_s - first.process_s - board_s) / seconds, board_s / seconds, min(b - a for a, b in zip(first.frames, last.frames)) / seconds,
-                     max(b - a for a, b in zip((first.server_mb, *first.tabs_mb), (last.server_mb, *last.tabs_mb))))
+        return Found((last.process_s - first.process_s - board_s) / seconds, board_s / seconds, min(b - a for a, b in zip(first.frames, last.frames)) / seconds)
+
+
+def growth_mb(rows: list[Row]) -> float:
+    """Of what has grown most, server or tab: from the median of the first third of the rows to that of the last. What a tab has just got makes single ones differ."""
+    third = max(1, len(rows) // 3)
+    early, late = ([statistics.median(sizes) for sizes in zip(*((row.server_mb, *row.tabs_mb) for row in part))] for part in (rows[:third], rows[-third:]))
+    return max(b - a for a, b in zip(early, late))
 
 
 def failures(rows: list[Row]) -> list[str]:
@@ -79,8 +84,8 @@ def failures(rows: list[Row]) -> list[str]:
         found.append(f"the server takes {whole.server:.1%} of a core beside the board, more than {SHARE_MOST:.0%}")
     if round(whole.frames_per_s, 1) < FRAMES_PER_S:
         found.append(f"a tab shows {whole.frames_per_s:.1f} frames a second, less than {FRAMES_PER_S}")
-    if len(warm) > 1 and (growth_mb := Found.of(warm[0], warm[-1]).growth_mb) > GROWTH_MOST_MB:
-        found.append(f"memory has grown by {growth_mb:.1f} MB, more than {GROWTH_MOST_MB:g}")
+    if len(warm) > 1 and (grown_mb := growth_mb(warm)) > GROWTH_MOST_MB:
+        found.append(f"memory has grown by {grown_mb:.1f} MB, more than {GROWTH_MOST_MB:g}")
     return found
 
 
@@ -177,8 +182,9 @@ def rows(minutes: float, tabs: int) -> Iterator[Row]:
     try:
         server = Server()
         try:
-            handles, begun_s = _opened(driver, server.url, tabs), time.monotonic()
-            yield (first := _row(driver, handles, server))
+            handles = _opened(driver, server.url, tabs)
+            first, begun_s = _row(driver, handles, server), time.monotonic()
+            yield first
             while (left_s := 60.0 * minutes - (time.monotonic() - begun_s)) > 0.0:
                 time.sleep(min(left_s, ROW_S))
                 if server.process.poll() is not None:
