@@ -9,6 +9,7 @@ import xc16
 from tools.bench import pil
 from tools.live import board as live_board
 from tools.live import step
+from tools.live.__main__ import main
 from tools.live.pace import Pacemaker
 from tools.live.recording import Origin
 from tools.live.symbols import Symbols
@@ -52,6 +53,15 @@ def living():
         pytest.skip(xc16.NONE)
     with contextlib.closing(Living()) as item:
         yield item
+
+
+@pytest.mark.parametrize("words, told", [
+    (("--image", "an.elf"), "an image for the PC's processor, IMAGE: add CPU=33f"),
+    (("--cpu", "33f", "--port", "/dev/null"), "CPU"), (("--cpu", "33f", "--image", "no such.elf"), "no such.elf")])
+def test_what_does_not_go_with_an_image_is_one_line(capsys, words, told) -> None:
+    assert main([*words, "--listen", "0"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("foc33: ") and said.count("\n") == 1 and told in said
 
 
 def test_constants_of_the_image_are_no_variables(living) -> None:

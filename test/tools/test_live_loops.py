@@ -141,7 +141,8 @@ def test_the_current_loop_in_closed_loop_is_told_to_be_less_than_it_is(living):
 @pytest.mark.parametrize("name, size, caption, peak", [
     ("current", 5, "0.138 A", 0.15), ("speed", 10, "14", 0.05), ("load", 40, "32 mN·m", None)])
 def test_a_step_of_the_running_motor_is_as_the_model_says_and_nobody_has_lost_the_command(living, monkeypatch, name, size, caption, peak):
-    monkeypatch.setattr(step, "RECORDS", 2)
+    records = 4 if name == "load" else 2 # one that meets the ripple's lowest place dips deeper
+    monkeypatch.setattr(step, "RECORDS", records)
     living.turning()
     time.sleep(0.3)
     before = living.maker.call(lambda: living.board.frame()["now"]).result(5)
@@ -149,7 +150,7 @@ def test_a_step_of_the_running_motor_is_as_the_model_says_and_nobody_has_lost_th
     refusal(lambda: living.do(measure="speed"), f"the step of the {name} is being measured, loops: cancel that or wait")
     living.measured()
     told = living.loops.steps.told
-    assert told["said"] == "mean of 2 steps" and told["caption"].startswith(f"Step of the {name}, {caption}") and " at 14" in told["caption"], told
+    assert told["said"] == f"mean of {records} steps" and told["caption"].startswith(f"Step of the {name}, {caption}") and " at 14" in told["caption"], told
     assert len(told["time_ms"]) == len(told["measured"]) == len(told["model"]) > 50 and told["time_ms"][0] < 0.0 < told["time_ms"][-1]
     measured, model = told["figures"]["measured"], told["figures"]["model"]
     if name == "load":

@@ -15,8 +15,8 @@ EXACT = {"3", "10", "12", "60", "1000", "2000", "3.14159265", "1.73205081", "0.0
 # The ends of a format's word, with room for what is added; a clock; a schedule. The line has the name that it stands for.
 NAMED = {"SPEED_UNIT_ERPM": "32000", "PWM_TICK_SEC": "0.000000025", "DEFER_BELOW_SEC": "0.00004", "CURRENT_PI_SHIFT": "10", "PARAM_LS_RAISED": "1.2",
          "PARAM_LOAD_FROM": "16000", "PARAM_INNOVATION_MAX": "16000", "PARAM_ACCEL_SHIFT": " ".join(map(str, range(16))), "PARAM_PROTECTION_INIT": "32700 0.99", "TUNING_STEP_Q16": "1",
-         # The share's rounding; an NTC's table and its exponential function, Kelvin and 25 degrees Celsius.
-         "CHOPPER_SHARE_Q10": "0.01", "NTC_LEAST_C": "40", "NTC_NODES": "13", "NTC_MOST_C": "152", "PARAM_NTC_EXP_TOP": "120",
+         # 1/e; the share's rounding; an NTC's table and its exponential function, Kelvin and 25 degrees Celsius.
+         "PARAM_LOAD_MEAN": "0.36788", "CHOPPER_SHARE_Q10": "0.01", "NTC_LEAST_C": "40", "NTC_NODES": "13", "NTC_MOST_C": "152", "PARAM_NTC_EXP_TOP": "120",
          "PARAM_NTC_SHARE": "298.15 273.15"}
 COMMENT = re.compile(r"/\*.*?\*/|\"[^\"]*\"", re.DOTALL)
 
