@@ -1,5 +1,6 @@
 /* The blocks of the control law, each with all inputs and all parameters of their ranges.
  *
+ * minutes: proof_between proof_omega
  * options: -eva-split-return-function qm_beyond:full -eva-slevel-function qm_abs:5,qm_beyond:5,qm_clamp:5,qm_limit:5,set_bounds:40,largest_ls:40
  *     -eva-subdivide-non-linear-function estimator_oldest:100 */
 #include "any.h"

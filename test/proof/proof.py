@@ -1,10 +1,10 @@
 """Runs the proofs: Frama-C's Eva over test/proof/*.c with the target's 16-bit int. One proof is one function proof_*().
 
-The head of each file names its sources, Eva's options, and the modes of the firmware in which a proof runs as well. A proof passes if
+The head of each file names its sources, Eva's options, the modes of the firmware in which a proof runs as well, and which proofs take minutes. A proof passes if
 Eva raises no alarm, every `check` is valid and reached, and the proof's function returns; there is no list of exceptions.
 
 proved.txt keeps, for each proof, the checksum of what it was given when it passed: text without comments, options and Frama-C's version. With
---new only those run whose checksum has changed, and an eighth of the others, another one with each commit.
+--new only those run whose checksum has changed, and an eighth of the others, another one with each commit; not of those that take minutes.
 """
 
 import argparse
@@ -38,6 +38,8 @@ class Proof:
     sources: list[str]
     options: list[str]
     mode: str
+    minutes: bool = False
+    """long enough to hold up a push"""
 
 
 def head_entry(text: str, key: str) -> list[str]:
@@ -53,7 +55,8 @@ def read_proofs(file: Path) -> list[Proof]:
     for function in functions:
         for mode in [""] + (modes[1:] if modes and modes[0] == function else []):
             name = function.removeprefix("proof_") + (f"_{mode}" if mode else "")
-            proofs.append(Proof(name, function, file, head_entry(text, "sources"), head_entry(text, "options"), mode))
+            proofs.append(Proof(name, function, file, head_entry(text, "sources"), head_entry(text, "options"), mode,
+                                function in head_entry(text, "minutes")))
     return proofs
 
 
@@ -83,7 +86,7 @@ def read_record() -> dict[str, str]:
 
 
 def is_spot_check(proof: Proof, commit: str) -> bool:
-    return int(hashlib.sha256(f"{commit} {proof.name}".encode()).hexdigest(), 16) % SPOT_CHECKS == 0
+    return not proof.minutes and int(hashlib.sha256(f"{commit} {proof.name}".encode()).hexdigest(), 16) % SPOT_CHECKS == 0
 
 
 def run(proof: Proof) -> tuple[list[str], float]:

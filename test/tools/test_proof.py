@@ -109,3 +109,6 @@ def test_spot_checks_come_to_each_proof_within_some_commits() -> None:
     one = whole.Proof("tick", "proof_tick", paths.ROOT, [], [], "")
     hits = sum(whole.is_spot_check(one, f"{commit:040x}") for commit in range(400))
     assert 25 <= hits <= 75
+    assert {one.name for one in whole.all_proofs() if one.minutes} == {"between", "omega"}
+    one.minutes = True
+    assert not any(whole.is_spot_check(one, f"{commit:040x}") for commit in range(400))
