@@ -309,8 +309,8 @@ def _at_once(d: Design) -> list[str]:
         return []
     answers_s, rpm = load_onset.answer_s(d), max(d.value("MINIMUM_SPEED_RPM"), load_onset.step_rpm(d))
 
-    def stops_s(speed_rpm: float, inertia: float = d.inertia_kgm2) -> float:
-        return reach.stops_s({"mech.inertia_kgm2": inertia, "mech.coulomb_nm": m.coulomb_nm, "mech.viscous_nms": m.viscous_nms}, speed_rpm, torque)
+    def stops_s(speed_rpm: float) -> float:
+        return reach.stops_s({"mech.inertia_kgm2": d.inertia_kgm2, "mech.coulomb_nm": m.coulomb_nm, "mech.viscous_nms": m.viscous_nms}, speed_rpm, torque)
     if stops_s(rpm) >= AT_ONCE_SHARE * answers_s:
         return []
     least = limits.digits_up(limits.halved(lambda speed: stops_s(speed) < answers_s, rpm, nominal, 20), 2)

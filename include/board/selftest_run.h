@@ -51,7 +51,7 @@ char *selftest_put(char *at);
 /** First line: says that the image has no CRC, so that the flash is not tested. @return the text's end */
 char *selftest_put_marked(char *at);
 #else
-#define board_selftest_failed 0u
+#define board_selftest_failed 0u /* no test, none failed */
 #define selftest_reset_cause(rcon) (rcon)
 #define selftest_start(kept) ((void)(kept))
 #define selftest_pass() ((void)0)

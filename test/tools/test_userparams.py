@@ -85,6 +85,8 @@ MISTAKES = {
                                  f"MOTOR_KPHI_V_PER_KRPM = 7,24 is no number: write one, {range_of('MOTOR_KPHI_V_PER_KRPM')}"),
     "a gain that is no number": (HEADER.replace(RS, RS + "#define SPEEDCNTR_PTERM 0,1\n"), "SPEEDCNTR_PTERM",
                                  "SPEEDCNTR_PTERM = 0,1 is no number: remove the line, or write a number"),
+    **{f"a bridge of {text}": (HEADER.replace(RS, RS + f"#define BRIDGE_RS_OHM {text}\n"), "BRIDGE_RS_OHM", f"BRIDGE_RS_OHM {says}") for text, says in (
+        ("abc", "= abc is no number: remove the line, or write a number"), ("1;", "= 1; ends in a semicolon: write 1"), ("-1", "must be 0 .. 1 ohm"))},
     "nothing": (value("MOTOR_RS_OHM", ""), "MOTOR_RS_OHM", f"MOTOR_RS_OHM has no value: write a number, {range_of('MOTOR_RS_OHM')}"),
     **{f"removed {name}": (HEADER.replace(line_of(name), ""), "",
                            f"{name} is missing: add #define {name} and a number, {range_of(name)}, or make tune")

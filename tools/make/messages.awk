@@ -47,6 +47,10 @@ match($0, /error: userparams\.h: /) {
     names[count] = between ? text : name
     next
 }
+/error: / && between && some { # a relation with a value that was told to be no number
+    checked = 1
+    next
+}
 /error: / && other == "" {
     other = $0
     other_name = name
