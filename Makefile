@@ -296,7 +296,8 @@ $(app_copy): FORCE
 	$(if $(filter $@,$(app_source)),$(copy_app))
 
 define copy_app
-@test -f $(call quoted,$(APP)) || { echo foc33: no application, $(call quoted,APP=$(APP)): use one of $(apps) of firmware/app, or name a file >&2; exit 2; }
+@test ! -d $(call quoted,$(APP)) || { echo foc33: $(call quoted,$(APP)) is a folder, APP: name the C file in it >&2; exit 2; }
+@test -f $(call quoted,$(APP)) || { echo foc33: no file $(call quoted,$(APP)), APP: name a C file, or one of $(apps) >&2; exit 2; }
 @mkdir -p $(@D); { printf '#line 1 "%s"\n' "$$(printf %s $(call quoted,$(APP)) | sed 's/[\\"]/\\&/g')"; cat $(call quoted,$(APP)); } >$@.new && \
     { cmp -s $@.new $@ && rm $@.new || mv $@.new $@; }
 endef
@@ -307,7 +308,7 @@ $B/app.from: FORCE
 	$(call remember,$(app_source))
 
 $B/app.o: $(app_source) $B/app.from $B/flags tools/make/app.sh | $B/params
-	$(call say,cc,$(app_shown))tools/make/app.sh $@ $< $(call quoted,$(app_shown)) nm $(compile) -MMD -MP
+	$(call say,cc,$(call quoted,$(app_shown)))tools/make/app.sh $@ $< $(call quoted,$(app_shown)) nm $(compile) -MMD -MP
 
 $B/contents: FORCE
 	$(call remember,$(firmware_objects) $(board_objects))

@@ -5,7 +5,7 @@
  *
  * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep
  * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,
- * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/param_scaling.h; the table at the end shows them.
+ * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/scaling/; the table at the end shows them.
  *
  * Note: 24 V are too low for the rated torque at rated speed: about 0.063 N m of 0.08 N m at 2800 rpm; raise the supply voltage,
  * or lower the rated speed to 2300 rpm */
@@ -70,7 +70,7 @@
 #define I2T_TIME_SEC 60             /* [s]             2 .. 1000      the winding's thermal time constant */
 #define SUPPLY_CURRENT_LIMIT_A 0    /* [A]             0 .. 20        what the running motor may draw from the supply, in the mean; 0: no limit of its own */
 
-/* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h --- */
+/* ---- Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/scaling/controllers.h  */
 #define CURRENT_BANDWIDTH_HZ 1000   /* [Hz]            20 .. 2000     both current loops: phase margin 72 degrees, 61 over the parameter set */
 #define SPEED_BANDWIDTH_HZ 12.6     /* [Hz]            0.2 .. 60      speed loop: phase margin 52 degrees, 51 over the parameter set */
 #define LOAD_BANDWIDTH_HZ 107       /* [Hz]            1 .. 200       load observer after a load step; slower under a steady load, slowest without one: phase margin 18 degrees after a load step, 42 under load */

@@ -1,7 +1,7 @@
 """pytest --jobs N: suites (test files) side by side, each in a process of its own: one line a suite, and at the end "N passed, N failed".
 
-A suite that ends before its last test (a crash, the time limit), that make could not build or that runs no test has failed. Without --jobs
-pytest works as everywhere.
+One suite with the mark `waits` runs beside those, for it leaves the processor idle. A suite that ends before its last test (a crash, the time
+limit), that make could not build or that runs no test has failed. Without --jobs pytest works as everywhere.
 """
 
 import json
@@ -44,6 +44,11 @@ def name_of(path: Path, config: pytest.Config) -> str:
     return str(path.resolve().relative_to(config.rootpath).with_suffix(""))
 
 
+def waits(items: list[pytest.Item]) -> bool:
+    """True for a suite that leaves the processor idle."""
+    return items[0].get_closest_marker("waits") is not None
+
+
 class NotBuilt(pytest.File):
     """A suite that make could not build."""
 
@@ -57,6 +62,7 @@ class Child:
     def __init__(self, config: pytest.Config, items: list[pytest.Item]) -> None:
         self.suite = name_of(items[0].path, config)
         self.missing = [item.nodeid for item in items]
+        self.waits = waits(items)
         self.start = time.monotonic()
         self.text = b""
         self.pipe, writer = os.pipe()
@@ -142,8 +148,8 @@ class SideBySide:
 
     def loop(self, waiting: dict[str, list[pytest.Item]], selector: selectors.BaseSelector) -> None:
         while waiting or selector.get_map():
-            while waiting and len(selector.get_map()) < self.config.option.jobs:
-                child = Child(self.config, waiting.pop(next(iter(waiting))))
+            while suite := self.following(waiting, [key.data for key in selector.get_map().values()]):
+                child = Child(self.config, waiting.pop(suite))
                 selector.register(child.pipe, selectors.EVENT_READ, child)
             for key, _ in selector.select(1):
                 reports = key.data.reports()
@@ -156,6 +162,12 @@ class SideBySide:
                 if time.monotonic() > key.data.start + self.limit_s:
                     key.data.stop()
             self.still([key.data for key in selector.get_map().values()])
+
+    def following(self, waiting: dict[str, list[pytest.Item]], running: list[Child]) -> str:
+        """The next suite that there is room for."""
+        waits_already = sum(child.waits for child in running)
+        room = {True: not waits_already, False: len(running) - waits_already < self.config.option.jobs}
+        return next((suite for suite, items in waiting.items() if room[waits(items)]), "")
 
     def still(self, running: list[Child]) -> None:
         """Says which suites run when no line has come for a while."""

@@ -21,6 +21,7 @@ LATER_RS_DIVISOR = 16
 LATER_NAMES = ("SPEEDREFRAMP_COUNT", "Q15_OVER_CURRENT_THRESHOLD")
 """Only AN1292's version of 2022 has them; it divides NORM_RS by 16, the earlier ones by 2."""
 DIVISORS = {"NORM_RS": 2, "NORM_LSDTBASE": 256, "NORM_INVKFIBASE": 2}
+DIVISOR_KEYS = {"NORM_RS": "rs_divisor", "NORM_LSDTBASE": "ls_divisor", "NORM_INVKFIBASE": "invkfi_divisor"}
 SAME = 0.005
 """Two numbers for one thing may differ by that: counts are rounded."""
 SAME_SPEED = 0.02
@@ -225,6 +226,10 @@ def _read_divisors(found: UserParms, given: dict[str, int]) -> None:
         scale = found.maybe(f"{name}_SCALE", 0, 15)
         if scale is not None:
             found.divisors[name] = 1 << round(scale)
+        for other in found.header.defines:
+            if other.startswith(f"{name}_") and other not in known_names() and name not in given:
+                found.notes.append(f"line {found.header.defines[other].line}: {other} is not read; {name} is taken as divided by {found.divisors[name]}: "
+                                   f"if yours is not, {DIVISOR_KEYS[name]}= in SET")
     found.divisors |= given
 
 

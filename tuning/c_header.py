@@ -451,6 +451,8 @@ class _Expression:
         if re.fullmatch(r"[A-Za-z_]\w*", token):
             if self.unknown is not None:
                 return self.unknown
+            if token in self.header.defines:
+                raise self.fail(f"{token} in line {self.header.defines[token].line} leads back to itself", "write its number there")
             raise self.fail(f"{token} is not defined in this header", f"write its number, or add #define {token} with its number")
         self.at -= 1
         raise self._unexpected()

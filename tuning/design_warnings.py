@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from tools.bench import reach
 from tools.common.board_file import TABLES
@@ -298,26 +298,45 @@ def _held(d: Design) -> list[str]:
     if rpm is None:
         return [warning(f"a load of {torque:.3g} N m that comes within {load_onset.ONSET_S:g} s stops so light a rotor at every speed up to NOMINAL_SPEED_RPM = "
                         f"{d.value('NOMINAL_SPEED_RPM'):g}, before the drive answers", _heavier(d, torque))]
+    stopped = _stopped_at_once(d)
+    wanted = max(rpm, stopped.least_rpm) if stopped and stopped.least_rpm < d.value("NOMINAL_SPEED_RPM") else rpm # one number for both
     return [warning(f"MINIMUM_SPEED_RPM = {least:g}: a load of {torque:.3g} N m that comes within {load_onset.ONSET_S:g} s stops the rotor there, "
-                    + (f"{held_nm:.2g} N m are held" if held_nm > 0.0 else "none is held"), f"set MINIMUM_SPEED_RPM to {rpm:g} in [tune]")]
+                    + (f"{held_nm:.2g} N m are held" if held_nm > 0.0 else "none is held"), f"set MINIMUM_SPEED_RPM to {wanted:g} in [tune]")]
 
 
-def _at_once(d: Design) -> list[str]:
-    """A brake that closes at once, as in `make loadsteps`: a rotor that it stops before the drive has an answer may not come back."""
+@dataclass(frozen=True)
+class AtOnce:
+    """A rotor that a brake stops at this speed before the drive answers, and the speed from which on it does not."""
+
+    rpm: float
+    stops_s: float
+    answers_s: float
+    least_rpm: float
+
+
+def _stopped_at_once(d: Design) -> AtOnce | None:
+    """At the lowest speed that `make loadsteps` asks for; None where the drive answers in time."""
     m, nominal, torque = d.motor, d.value("NOMINAL_SPEED_RPM"), load_onset.asked_nm(d)
-    if not load_onset.holds(d, nominal, torque): # told by _held
-        return []
     answers_s, rpm = load_onset.answer_s(d), max(d.value("MINIMUM_SPEED_RPM"), load_onset.step_rpm(d))
 
     def stops_s(speed_rpm: float) -> float:
         return reach.stops_s({"mech.inertia_kgm2": d.inertia_kgm2, "mech.coulomb_nm": m.coulomb_nm, "mech.viscous_nms": m.viscous_nms}, speed_rpm, torque)
     if stops_s(rpm) >= AT_ONCE_SHARE * answers_s:
+        return None
+    return AtOnce(rpm, stops_s(rpm), answers_s, limits.digits_up(limits.halved(lambda speed: stops_s(speed) < answers_s, rpm, nominal, 20), 2))
+
+
+def _at_once(d: Design) -> list[str]:
+    """A brake that closes at once, as in `make loadsteps`: a rotor that it stops before the drive has an answer may not come back."""
+    nominal, torque = d.value("NOMINAL_SPEED_RPM"), load_onset.asked_nm(d)
+    if not load_onset.holds(d, nominal, torque): # told by _held
         return []
-    least = limits.digits_up(limits.halved(lambda speed: stops_s(speed) < answers_s, rpm, nominal, 20), 2)
-    heavier = limits.digits_up(1.02 * d.inertia_kgm2 * answers_s / stops_s(rpm) - m.inertia_kgm2, 2)
-    return [warning(f"a brake that closes at once with {torque:.3g} N m stops so light a rotor at {rpm:g} rpm in {1e3 * stops_s(rpm):.2g} ms, the drive answers in "
-                    f"{1e3 * answers_s:.2g} ms, and the speed may not come back",
-                    f"set MINIMUM_SPEED_RPM to {least:g} in [tune]" if least < nominal else f"raise [load] inertia to {heavier:g} kg m2")]
+    if (stopped := _stopped_at_once(d)) is None:
+        return []
+    heavier = limits.digits_up(1.02 * d.inertia_kgm2 * stopped.answers_s / stopped.stops_s - d.motor.inertia_kgm2, 2)
+    return [warning(f"a brake that closes at once with {torque:.3g} N m stops so light a rotor at {stopped.rpm:g} rpm in {1e3 * stopped.stops_s:.2g} ms, the drive answers in "
+                    f"{1e3 * stopped.answers_s:.2g} ms, and the speed may not come back",
+                    f"set MINIMUM_SPEED_RPM to {stopped.least_rpm:g} in [tune]" if stopped.least_rpm < nominal else f"raise [load] inertia to {heavier:g} kg m2")]
 
 
 def _heavier(d: Design, load_nm: float) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from tools.common.errors import UserError
+from tools.common.param_rows import phase_ohm
 
 from .fw_bench import Bench, Fault, Point
 from .fw_tables import ENTRIES, STEP_ERPM, Entry
@@ -127,8 +128,8 @@ def model_use(params: dict[str, float], rpm: float, id_a: float, iq_a: float, ls
     vd = R id - w L iq, vq = R iq + w (L id + psi)."""
     pairs, ls_h = params["NOPOLESPAIRS"], params["MOTOR_LS_MH"] * 1e-3 * 2.0 * ls_ratio
     w = rpm * pairs * 2.0 * math.pi / 60.0
-    v_d = params["MOTOR_RS_OHM"] * id_a - w * ls_h * iq_a
-    v_q = params["MOTOR_RS_OHM"] * iq_a + w * (ls_h * id_a + flux_vs(params))
+    v_d = phase_ohm(params) * id_a - w * ls_h * iq_a
+    v_q = phase_ohm(params) * iq_a + w * (ls_h * id_a + flux_vs(params))
     return math.hypot(v_d, v_q) / voltage_limit(params)
 
 

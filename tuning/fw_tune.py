@@ -318,7 +318,7 @@ def highest_speed(known: dict[str, float]) -> float:
         # the back-EMF's format, as PARAM_EMF_MAX_V of include/drive/scaling/estimator.h
         u0 = bus / math.sqrt(3.0) * (1.0 - known["DEADTIME_SEC"] / known["LOOPTIME_SEC"]) / 32768.0
         free_v = 0.9895 * 131068.0 * u0 - known["OVER_VOLTAGE_V"] / math.sqrt(3.0) \
-            - 2.0 / math.sqrt(3.0) * known["OVER_CURRENT_THRESHOLD_A"] * known["MOTOR_RS_OHM"]
+            - 2.0 / math.sqrt(3.0) * known["OVER_CURRENT_THRESHOLD_A"] * param_rows.phase_ohm(known)
         by_emf = free_v / (2.0 * math.pi / 60.0 * pairs * 1.2 * known["MOTOR_LS_MH"] * 1e-3 * known["MAXIMUM_CURRENT_A"])
         # in the header's unit of speed, which 1/Kphi is counted in
         unit = constants.evaluate({name: f"{known[name]:g}" for name in ("NOPOLESPAIRS", "MAXIMUM_SPEED_RPM")}, "SPEED_UNIT")[0]

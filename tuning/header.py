@@ -56,7 +56,7 @@ def _head(design: Design) -> list[str]:
              f" * (make userparams MOTOR={name} writes it to userparams.h). Field weakening: {design.tables_from}.", " *",
              " * Each line states unit, range and meaning; a value outside its range fails the build by name. Change a number here to try it; to keep",
              " * it, write it into the motor file's [tune] and make the header again. The Q15 constants of AN1292 (NORM_RS, NORM_LSDTBASE,",
-             " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/param_scaling.h; the table at the end shows them."]
+             " * NORM_INVKFIBASE, NORM_DELTAT, D_ILIMIT_HS ...) follow from these in include/drive/scaling/; the table at the end shows them."]
     for warning in design.warnings:
         lines += [" *", *(f" * {line}" for line in textwrap.wrap("Note: " + _safe(warning), WIDTH + 8, break_long_words=False,
                                                              break_on_hyphens=False))]

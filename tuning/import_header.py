@@ -27,7 +27,7 @@ from .design import Design, design, plain
 from .fw_tables import Entry, Tables
 
 MOTOR_KEYS = {"inertia": units.INERTIA, "friction": units.FRICTION, "current": units.CURRENT, "torque": units.TORQUE}
-DIVISOR_KEYS = {"rs_divisor": "NORM_RS", "ls_divisor": "NORM_LSDTBASE", "invkfi_divisor": "NORM_INVKFIBASE"}
+DIVISOR_KEYS = {key: name for name, key in an1292.DIVISOR_KEYS.items()}
 TABLES_KEY, FLAT, AS_THEY_ARE = "tables", "flat", "header"
 """tables=flat takes the d current only: 1/Kphi and Ls do not change with the speed."""
 DIVISOR = Kind("1", 1, 32768, {"1": units.Conversion(1.0)})

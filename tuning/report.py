@@ -71,8 +71,8 @@ def _margin_text(loop: LoopDesign | None) -> str:
     nominal = f"phase margin {loop.nominal.phase_deg:.1f} degrees" if loop.nominal.stable else "unstable"
     if not loop.worst.stable:
         return f"{loop.bandwidth_hz:g} Hz, {nominal}, unstable at worst ({loop.worst_case})"
-    return (f"{loop.bandwidth_hz:g} Hz, {nominal}, {loop.worst.phase_deg:.1f} at worst ({loop.worst_case}), "
-            f"gain margin {loop.nominal.gain_db:.0f} dB, {loop.worst.gain_db:.0f} at worst")
+    return (f"{loop.bandwidth_hz:g} Hz, {nominal}, {loop.worst.phase_deg:.1f} at worst ({loop.worst_case}; "
+            f"{loop.worst.asked_deg:.0f} are asked there), gain margin {loop.nominal.gain_db:.0f} dB, {loop.worst.gain_db:.0f} at worst")
 
 
 # ---- folder --------------------------------------------------------------------------------------------------------------------

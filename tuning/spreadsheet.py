@@ -24,8 +24,8 @@ from .limits import UNIT_ERPM
 FILE = paths.ROOT / "tuning" / "tuning_params.xlsx"
 DEFAULT_MOTOR = "hurst_dmb0224c10002"
 OWN = "own motor"
-GAINS = ("D_CURRCNTR_PTERM", "Q_CURRCNTR_PTERM")
-"""Parameters without a row: the tuner gives them to motors whose Ld and Lq differ."""
+OPTIONAL = {"D_CURRCNTR_PTERM": ("Q15/16", 0.0001, 0.9999), "Q_CURRCNTR_PTERM": ("Q15/16", 0.0001, 0.9999), "BRIDGE_RS_OHM": ("ohm", 0, 1)}
+"""Parameters without a row, with unit and range: the tuner gives them to motors whose Ld and Lq differ, or whose winding the bridge adds to."""
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,15 @@ DATA = {
 FORMULAS = {x.parameter: f'IF({x.name}="","",{x.formula})' for rows in DATA.values() for x in rows}
 
 IU = "(I0_a/U0_v)"
+OHM = '(MOTOR_RS_OHM+IF(BRIDGE_RS_OHM="",0,BRIDGE_RS_OHM))'
+"""Winding and bridge."""
 TOP_ERPM = "MAXIMUM_SPEED_RPM*NOPOLESPAIRS"
 LARGEST_CURRENT = "MAXIMUM_CURRENT_A/NORM_CURRENT_CONST"
 FASTEST = "MAX(MAXIMUM_SPEED_RPM,1.5*NOMINAL_SPEED_RPM)"
 LDI = f"(2*PI()/60*{FASTEST}*NOPOLESPAIRS*1.2*MOTOR_LS_MH/1000*MAXIMUM_CURRENT_A)"
-LDI_SHARE = (f"MAX(0.75,MIN(1,(0.98*131068*U0_v-MIN(OVER_VOLTAGE_V,1.25*NOMINAL_BUS_V)/SQRT(3)-1.6*2/SQRT(3)*OVER_CURRENT_THRESHOLD_A*MOTOR_RS_OHM)/{LDI}))")
+LDI_SHARE = (f"MAX(0.75,MIN(1,(0.98*131068*U0_v-MIN(OVER_VOLTAGE_V,1.25*NOMINAL_BUS_V)/SQRT(3)-1.6*2/SQRT(3)*OVER_CURRENT_THRESHOLD_A*{OHM})/{LDI}))")
 """What the back-EMF's format leaves for L di/dt, where the adaptation may raise R by 60 %."""
-SCALED = (("NORM_RS", "MOTOR_RS_OHM*I0_a/U0_v*32768", "Rs I0/U0 2^15 (Equation 5)", 1, "phase resistance"),
+SCALED = (("NORM_RS", f"{OHM}*I0_a/U0_v*32768", "Rs I0/U0 2^15 (Equation 5)", 1, "phase resistance"),
           ("NORM_LSDTBASE", "MOTOR_LS_MH/1000/LOOPTIME_SEC*I0_a/U0_v*32768", "(Ls/Ts) I0/U0 2^15 (Equation 5)", 8,
            "phase inductance; the shift of the eight-sample difference is 3 more"),
           ("NORM_INVKFIBASE", "SQRT(3)*1000*NOPOLESPAIRS*U0_v/MOTOR_KPHI_V_PER_KRPM*32768", "sqrt(3) 1000 P U0/Kphi 2^15 (Equation 6)", 1,
@@ -82,12 +84,12 @@ def _pterm(axis: str) -> str:
     return f'IF({axis}_CURRCNTR_PTERM="",2*PI()*CURRENT_BANDWIDTH_HZ*MOTOR_LS_MH/1000*{IU}/16,{axis}_CURRCNTR_PTERM)'
 
 
-ITERM = f"2*PI()*CURRENT_BANDWIDTH_HZ*MOTOR_RS_OHM*LOOPTIME_SEC*{IU}"
+ITERM = f"2*PI()*CURRENT_BANDWIDTH_HZ*{OHM}*LOOPTIME_SEC*{IU}"
 KT = "(1.5*MOTOR_KPHI_V_PER_KRPM/SQRT(3)*60/(2000*PI()))"
 SPEED_PTERM = f"2*PI()*SPEED_BANDWIDTH_HZ*MOTOR_INERTIA_KGM2/{KT}*(2*PI()/60)/NOPOLESPAIRS/NORM_CURRENT_CONST/16*SPEED_UNIT"
 CONSTANTS = {
     "Motor, in the firmware's formats": (
-        ("NORM_RS", f"MIN(MOTOR_RS_OHM*{IU}*16384,32767)", "Q15 / 2", "Equation 5, at most 32767"),
+        ("NORM_RS", f"MIN({OHM}*{IU}*16384,32767)", "Q15 / 2", "Equation 5, at most 32767"),
         ("NORM_LSDTBASE", f"MIN(MOTOR_LS_MH/1000/LOOPTIME_SEC*{IU}*128,32767)", "Q15 / 256", "Equation 5, at most 32767"),
         ("NORM_INVKFIBASE", "SQRT(3)*1000*NOPOLESPAIRS*U0_v/MOTOR_KPHI_V_PER_KRPM*16384/SPEED_UNIT", "Q15 / 2", "Equation 6"),
         ("NORM_DELTAT", "LOOPTIME_SEC/60*2147483648*SPEED_UNIT", "Q15 of a turn/erpm", "Equation 1")),
@@ -232,11 +234,11 @@ def _parameters(book: Any) -> None:
                       (p.unit, "label"), (f"{p.low} .. {p.high}", "label"), (check, "check"), (p.meaning, "label"))
             page.range(f"C{row}", float(p.low), float(p.high), p.name)
             book.name(p.name, "Parameters", f"D{row}")
-    page.section("Gains where the two axes differ; empty: from the bandwidth")
-    for name in GAINS:
+    page.section("Gains where the two axes differ, empty: from the bandwidth; transistor and half of the shunt, empty: 0")
+    for name, (unit, low, high) in OPTIONAL.items():
         row = page.row
-        page.line((name, "code"), (f"={_picked(name)}", "value"), (None, "input"), (f'=IF(C{row}="",B{row},C{row})', "result"), ("Q15/16", "label"))
-        page.range(f"C{row}", 0.0001, 0.9999, name)
+        page.line((name, "code"), (f"={_picked(name)}", "value"), (None, "input"), (f'=IF(C{row}="",B{row},C{row})', "result"), (unit, "label"))
+        page.range(f"C{row}", low, high, name)
         book.name(name, "Parameters", f"D{row}")
 
 
@@ -276,7 +278,7 @@ def _paste(book: Any) -> None:
         for p in rows:
             comment = "" if p.stem and p.name != f"{p.stem}0" else f" /* [{p.unit}] {p.low} .. {p.high} {p.meaning} */"
             lines.append(f'=IF({p.name}="","#error {p.name} needs a value","#define {p.name} "&{number.format(p.name)}&"{comment}")')
-    lines += [None, *(f'=IF({name}="","","#define {name} "&{number.format(name)})' for name in GAINS), None, "#endif"]
+    lines += [None, *(f'=IF({name}="","","#define {name} "&{number.format(name)})' for name in OPTIONAL), None, "#endif"]
     for line in lines:
         page.line((line, "code"))
 
@@ -287,7 +289,7 @@ def _motors(book: Any, designs: list[Design]) -> None:
     last = book.letter(len(designs) + 2)
     usual = max(range(len(designs)), key=lambda i: designs[i].motor.name == DEFAULT_MOTOR) # the board of one's own motor
     book.name("motor_names", "Motors", f"B{row}:{last}{row}")
-    for name in [*parameters(), *GAINS]:
+    for name in [*parameters(), *OPTIONAL]:
         values = [_cell(d.params.get(name)) for d in designs]
         default = parameters()[name].default if name in parameters() else ""
         own = values[usual] if default == "FROM_BOARD" else _cell(default) if default and default not in FOLLOWS else None

@@ -49,8 +49,8 @@ LARGEST_RATE = 2000
 LARGEST_END_RPM = 10000.0
 LEAST_ERPM = 100.0
 """Speeds are whole electrical rpm: less would be coarser than a hundredth."""
-SAMPLE_AFTER_MEAN_S = 1.5e-6
-"""SAMPLE_DELAY_CLOCKS of include/control/tuned.h: between the two the back-EMF takes E t/L off the current, which the loop then adds."""
+SAMPLE_AFTER_MEAN_S = 25e-9 * number("SAMPLE_DELAY_CLOCKS")
+"""Between the two the back-EMF takes E t/L off the current, which the loop then adds."""
 CALM_SHARE = 0.03
 """Share of the hand-over speed by which the rotor may still swing about it without a longer lock: the hand-over overshoots by several times that."""
 LOWEST_SHARE = number("PARAM_LOWEST_SHARE")

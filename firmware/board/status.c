@@ -10,7 +10,6 @@
 #include "board/selftest_run.h"
 #include "board/watch.h"
 #include "drive/limits.h"
-#include "version.h"
 
 #if SCOPE && APP_SERIAL
 #error foc33: an application with app/line.h has the serial line, and so has SCOPE: set SCOPE 0

@@ -127,7 +127,7 @@ void observer_answer(observer_t *o, int16_t innovation)
         unrest--;
     } else { /* calm for long */
     }
-    if (qm_abs(innovation) > o->gate_erpm && (!stirred || unrest < OBSERVER_GATE_STEPS)) {
+    if (qm_beyond(innovation, o->gate_erpm) && (!stirred || unrest < OBSERVER_GATE_STEPS)) {
         if (stirred && (innovation ^ o->gate_last_erpm) < 0) {
             unrest = OBSERVER_GATE_STEPS;
         }
@@ -150,7 +150,7 @@ void observer_step(observer_t *o, const observer_params_t *p, uint32_t rho_q32, 
     o->innovation_erpm = innovation;
     o->omega_q16 = observer_sum(o->omega_q16, 2 * qm_mulss(innovation, o->rate_q16));
     o->load_q16 = qm_clamp_hi(o->load_q16 - observer_load_step(p, innovation, o->rate_q16), (int16_t)-p->load_max, p->load_max);
-    if (qm_abs(innovation) > o->wrong_erpm) {
+    if (qm_beyond(innovation, o->wrong_erpm)) {
         o->wrong_steps++;
     } else if (o->wrong_steps != 0u) {
         o->wrong_steps--;

@@ -4,10 +4,10 @@
 #include "drive/drive.h"
 #include "drive/tick.h"
 
-#define CATCH_LOOK_PERIODS (CATCH_LOOK_STEPS * SLOW_PERIODS)            /**< of a look at a slow rotor */
-#define CATCH_STANDS_Q11 ((int16_t)(CATCH_STANDS * CATCH_LOOK_PERIODS)) /**< the sum of a whole look's currents below it is none: two steps of the converter in the mean */
-#define CATCH_BUS_PERIODS (2048u * SLOW_PERIODS)                        /**< a rotor that holds the bus there slows down, and the bus falls with it: within some tenths of a second */
-#define CATCH_MOST_FLUX_Q11 24000                                       /**< flux of a look that its format holds */
+#define CATCH_LOOK_PERIODS (CATCH_LOOK_STEPS * SLOW_PERIODS)                /**< of a look at a slow rotor */
+#define CATCH_STANDS_Q11 ((int16_t)(CATCH_STANDS * CATCH_LOOK_PERIODS - 1)) /**< the sum of a whole look's currents up to it is none: two steps of the converter in the mean */
+#define CATCH_BUS_PERIODS (2048u * SLOW_PERIODS)                            /**< a rotor that holds the bus there slows down, and the bus falls with it: within some tenths of a second */
+#define CATCH_MOST_FLUX_Q11 24000                                           /**< flux of a look that its format holds */
 
 /** The one place that writes the phase. */
 static void catch_enter(catch_t *c, catch_phase_t next)
@@ -110,7 +110,7 @@ uint16_t catch_look(drive_t *d, const drive_params_t *p)
     flux.alpha = catch_flux_q11(&d->run, &p->estimator, i.alpha, c->sum_q11.alpha);
     flux.beta = catch_flux_q11(&d->run, &p->estimator, i.beta, c->sum_q11.beta);
     direction = trig_direction((int16_t)-flux.alpha, (int16_t)-flux.beta);
-    if (samples < CATCH_LOOK_PERIODS || qm_abs(c->sum_q11.alpha) >= CATCH_STANDS_Q11 || qm_abs(c->sum_q11.beta) >= CATCH_STANDS_Q11) {
+    if (samples < CATCH_LOOK_PERIODS || qm_beyond(c->sum_q11.alpha, CATCH_STANDS_Q11) || qm_beyond(c->sum_q11.beta, CATCH_STANDS_Q11)) {
         if (c->phase == (uint16_t)CATCH_FIRST_LOOK) {
             c->pause = catch_pause(&d->run, p, flux, samples);
             samples = (uint16_t)(samples + 2u * c->pause);
@@ -176,7 +176,7 @@ QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t *p)
     e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;
     estimator_choose_span(e, &p->estimator);
     estimator_follow(e, &p->estimator);
-    drive_update_model(run, p, e->omega_erpm);
+    drive_update_model(run, p, e->omega_erpm, e->omega_erpm);
     emf = qm_divud(qm_muluu((uint16_t)qm_abs(e->omega_erpm), 2048u), (uint16_t)run->model.inv_kfi);
     e->e_q_q28 = (int32_t)qm_with_sign((int16_t)emf, ahead) * 65536;
     emf = (uint16_t)(4u * ((emf > 8191u) ? 8191u : emf));

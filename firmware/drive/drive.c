@@ -19,9 +19,10 @@ void drive_zero(void *object, uint16_t size)
     } while (left != 0u);
 }
 
-void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm)
+void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm, speed_erpm_t speed_erpm)
 {
-    fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, ref_erpm);
+    const uint16_t turns = (uint16_t)(run->held.phase == (uint16_t)HELD_NOT); /* as it should */
+    fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, turns ? ref_erpm : held_weakened_for(p, qm_abs(ref_erpm), qm_abs(speed_erpm)));
     salient_model(run, p);
     adaptation_apply(&run->adaptation, &p->adaptation, &run->model);
     if (held_angle_stands(&run->held)) {
@@ -42,7 +43,7 @@ void drive_init(drive_t *d, const drive_params_t *p)
     heat_init(d, p);
     bus_update_gain(d, p, p->bus_nominal_q15);
     bus_update_voltage_limit(d, p);
-    drive_update_model(&d->run, p, p->end_erpm);
+    drive_update_model(&d->run, p, p->end_erpm, p->end_erpm);
 }
 
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)

@@ -18,16 +18,10 @@ static NOINLINE void held_enter(held_t *shaft, held_phase_t next)
     shaft->doubts = 0;
 }
 
-/** What follows. */
-static void held_will(held_t *shaft, held_act_t act)
-{
-    shaft->act = (uint16_t)act;
-}
-
 void held_forget(held_t *shaft)
 {
     held_enter(shaft, HELD_NOT);
-    held_will(shaft, HELD_WAITS);
+    shaft->act = (uint16_t)HELD_WAITS;
     shaft->stood = 0;
 }
 
@@ -36,28 +30,10 @@ uint16_t held_angle_stands(const held_t *shaft)
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
-/** a - b, within half the format. */
-static NOINLINE int16_t held_less(int16_t a, int16_t b)
+/** How far the back-EMF has moved. */
+static uint16_t held_moved(dq_t emf, dq_t from)
 {
-    return qm_sub_limited(a, b);
-}
-
-/** A sum within low..high. */
-static NOINLINE int16_t held_within(int32_t sum, int16_t low, int16_t high)
-{
-    return qm_within(sum, low, high);
-}
-
-/** |a - b|. */
-QM_INLINE QM_WRAPS uint16_t held_apart(int16_t a, int16_t b)
-{
-    return (uint16_t)((a > b) ? (uint16_t)a - (uint16_t)b : (uint16_t)b - (uint16_t)a);
-}
-
-/** How far the back-EMF has moved: its parts fit half the format. */
-static NOINLINE uint16_t held_moved(dq_t emf, dq_t from)
-{
-    return (uint16_t)(held_apart(emf.d, from.d) + held_apart(emf.q, from.q));
+    return (uint16_t)(qm_abs(qm_sub_limited(emf.d, from.d)) + qm_abs(qm_sub_limited(emf.q, from.q)));
 }
 
 /** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
@@ -78,24 +54,27 @@ static speed_erpm_t held_speed(const drive_run_t *run, dq_t emf)
     return held_omega(run, held_sum(run->estimator.sign, emf));
 }
 
+speed_erpm_t held_weakened_for(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t speed)
+{
+    const speed_erpm_t from = p->fieldweak.on_speed_erpm;
+    if (reference <= from || speed >= reference >> 1) {
+        return reference;
+    }
+    return (int16_t)((speed > from >> 1) ? 2 * speed : from);
+}
+
 /** The angle that a speed turns in so many steps, a quarter turn at most. */
 static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uint16_t steps)
 {
     const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST,
                                            HELD_PERIOD_MOST); /* a quarter turn in a step */
-    return held_within(qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps), -HELD_QUARTER, HELD_QUARTER);
+    return qm_within(qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps), -HELD_QUARTER, HELD_QUARTER);
 }
 
 /** What a rotor has turned by in so many steps that is as fast as the back-EMF said when it was asked. */
 static NOINLINE int16_t held_as_asked(const drive_run_t *run, const drive_params_t *p, uint16_t steps)
 {
     return held_turned(p, held_speed(run, run->held.emf_q12), steps);
-}
-
-/** What it has turned by, by the sum of its back-EMF, a quarter turn at most. */
-static int16_t held_by_sum(const drive_run_t *run, const drive_params_t *p)
-{
-    return held_turned(p, held_omega(run, run->held.turned_q12), 1);
 }
 
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12)
@@ -142,11 +121,13 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
 static void held_stop_angle(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
+    uint16_t turns_far;
     int16_t lead;
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
-    shaft->patience = qm_beyond(lead, HELD_FAR_LEAD) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
+    turns_far = (uint16_t)(qm_beyond(lead, HELD_FAR_LEAD) || qm_beyond(d->run.control.ref_q13.d, (int16_t)(p->current_max_q13 >> HELD_FAR_SHIFT)));
+    shaft->patience = turns_far ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
     shaft->turned_q12 = 0;
     held_turn_back(d, p, lead);
     held_enter(shaft, HELD_SETTLES);
@@ -160,7 +141,7 @@ static void held_go_on(drive_t *d, const drive_params_t *p, speed_erpm_t omega_e
 {
     drive_run_t *run = &d->run;
     held_enter(&run->held, HELD_TURNS);
-    drive_update_model(run, p, run->control.reference_erpm);
+    drive_update_model(run, p, run->control.reference_erpm, omega_erpm);
     observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, omega_erpm, 0);
     run->observer.load_q16 = load_q16;
     run->observer.fast_share_q15 = 32767;
@@ -173,8 +154,8 @@ static void held_has_turned(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     const int32_t sum = shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience));
-    shaft->turned_q12 = held_within(sum, -32767, 32767);
-    held_turn_back(d, p, (int16_t)-held_by_sum(&d->run, p));
+    shaft->turned_q12 = qm_within(sum, -32767, 32767);
+    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(&d->run, shaft->turned_q12), 1));
     held_go_on(d, p, held_speed(&d->run, emf), d->run.observer.load_q16);
 }
 
@@ -184,15 +165,9 @@ static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
     drive_run_t *run = &d->run;
     held_t *shaft = &run->held;
     const int32_t load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : run->observer.load_q16;
-    held_turn_back(d, p, (int16_t)-held_by_sum(run, p));
+    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
     shaft->stood = 2;
     held_go_on(d, p, held_speed(run, emf), load_q16);
-}
-
-/** Half of what the back-EMF's d part would have changed by, of a rotor as fast as the back-EMF says. */
-static uint16_t held_half_turned(const drive_run_t *run, const drive_params_t *p, uint16_t steps)
-{
-    return (uint16_t)(3 * qm_abs(qm_mulhi(run->held.emf_q12.q, held_as_asked(run, p, steps)))); /* pi, nearly */
 }
 
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
@@ -202,14 +177,15 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     held_t *shaft = &d->run.held;
     const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1;                                              /* dead time shakes it by as much */
     const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps); /* since what it is compared with */
-    const uint16_t half = held_half_turned(&d->run, p, steps), tells = (uint16_t)(half > least);
-    const int16_t turned = held_less(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
-    const uint16_t turns = (uint16_t)(steps > 1u && turned > (int16_t)(tells ? half : least));
+    const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
+    const uint16_t tells = (uint16_t)(half > least);
+    const int16_t turned = qm_sub_limited(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
+    const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least));
 
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
-        held_will(shaft, ((turns && tells) || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
+        shaft->act = (uint16_t)(((turns && tells) || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
     } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && steps >= HELD_ASK_STEPS)) {
-        held_will(shaft, HELD_LEARN);
+        shaft->act = (uint16_t)HELD_LEARN;
     } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */
         shaft->emf_q12 = emf;
         shaft->turned_q12 = 0;
@@ -230,10 +206,10 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
             shaft->run_on = held_as_asked(run, p, (uint16_t)(shaft->doubted_steps + 1u));
-            held_will(shaft, HELD_TURN_BACK);
+            shaft->act = (uint16_t)HELD_TURN_BACK;
         }
-        run->adaptation.rs_q31 = (int32_t)held_within((int32_t)qm_hi(run->adaptation.rs_q31) + share, p->adaptation.rs_least, p->adaptation.rs_most) * 65536;
-        drive_update_model(run, p, run->control.reference_erpm);
+        run->adaptation.rs_q31 = (int32_t)qm_within((int32_t)qm_hi(run->adaptation.rs_q31) + share, p->adaptation.rs_least, p->adaptation.rs_most) * 65536;
+        drive_update_model(run, p, run->control.reference_erpm, 0);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
         run->estimator.e_q_q28 = 0;
         emf.d = 0;
@@ -247,16 +223,9 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
 static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
     const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
-    const int32_t lag = (int32_t)shaft->lag_q12 - (shaft->lag_q12 >> HELD_LAG_SHIFT) + shaft->emf_q12.q - emf.q - taken_back;
-    shaft->lag_q12 = held_within(lag, -32767, 32767);
-}
-
-/** 1 where a rotor that was asked is back at its speed, or may be asked again. */
-static uint16_t held_is_over(const drive_t *d, const drive_params_t *p)
-{
-    const held_t *shaft = &d->run.held;
-    return (uint16_t)(along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
-                      || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS));
+    const int16_t forgotten = (int16_t)((shaft->doubted_steps != 0u) ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT); /* of what happens at once all counts */
+    const int32_t lag = (int32_t)shaft->lag_q12 - forgotten + shaft->emf_q12.q - emf.q - taken_back;
+    shaft->lag_q12 = qm_within(lag, -32767, 32767);
 }
 
 /** The angle turns, and something changes fast or the rotor is slow. */
@@ -265,8 +234,9 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     held_t *shaft = &d->run.held;
     uint16_t doubts = held_doubts(d, p, emf);
     held_follow_lag(shaft, &d->run, emf);
-    if (shaft->phase != (uint16_t)HELD_NOT) {
-        if (held_is_over(d, p)) {
+    if (shaft->phase != (uint16_t)HELD_NOT) { /* until it is back at its speed, or may be asked again */
+        if (along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
+            || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS)) {
             held_enter(shaft, HELD_NOT);
             shaft->stood = 0;
         }
@@ -275,7 +245,7 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
     if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
-        held_will(shaft, HELD_STOP);
+        shaft->act = (uint16_t)HELD_STOP;
     }
 }
 
@@ -285,12 +255,12 @@ static void held_push(drive_t *d, const drive_params_t *p, uint16_t moved)
     held_t *shaft = &d->run.held;
     if (shaft->act == (uint16_t)HELD_WAITS) { /* else the frame is turned back first */
         if (moved > (uint16_t)p->adaptation.emf_least_q12 && shaft->steps > HELD_REST_STEPS) {
-            held_will(shaft, HELD_GOES_ON);
+            shaft->act = (uint16_t)HELD_GOES_ON;
             return;
         }
-        if (shaft->steps <= HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) {
-            shaft->run_on = along_direction(d, -HELD_PULL_ANGLE);
-            held_will(shaft, HELD_TURN_BACK);
+        if (shaft->steps <= 2u * HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) { /* ahead, and back */
+            shaft->run_on = along_direction(d, (int16_t)((shaft->steps <= HELD_PULL_STEPS) ? -HELD_PULL_ANGLE : HELD_PULL_ANGLE));
+            shaft->act = (uint16_t)HELD_TURN_BACK;
         }
     }
     shaft->turned_q12 = 0; /* the load is what flows, and it grows */
@@ -303,7 +273,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     held_t *shaft = &d->run.held;
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
     const int16_t base_q12 = (int16_t)((shaft->phase == (uint16_t)HELD_SETTLES) ? 0 : shaft->emf_q12.q);
-    shaft->turned_q12 = held_less(shaft->turned_q12, held_less(base_q12, emf.q));
+    shaft->turned_q12 = qm_sub_limited(shaft->turned_q12, qm_sub_limited(base_q12, emf.q));
     switch (shaft->phase) {
     case HELD_SETTLES:
         if (moved <= most >> 1) {
@@ -311,7 +281,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
             shaft->turned_q12 = 0;
             held_enter(shaft, HELD_ASKED);
         } else if (shaft->steps > shaft->patience) {
-            held_will(shaft, HELD_HAS_TURNED);
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
             emf.q = 0; /* all of it is in the sum */
         } else {       /* the current changes */
         }
@@ -348,7 +318,7 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
     const dq_t emf = estimator_emf(&d->run.estimator);
     const uint16_t act = shaft->act;
 
-    held_will(shaft, HELD_WAITS);
+    shaft->act = (uint16_t)HELD_WAITS;
     switch (act) {
     case HELD_STOP: held_stop_angle(d, p); break;
     case HELD_HAS_TURNED:

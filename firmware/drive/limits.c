@@ -4,13 +4,15 @@
 #include "drive/protection.h"
 #include "drive/speed.h"
 
-voltage_q14_t limits_free_voltage(const drive_control_t *c)
+/** What the q current lacks of its reference, in the reference's direction. */
+static current_q13_t limits_missing(const drive_control_t *c)
 {
-    int16_t missing = (int16_t)(c->ref_q13.q - c->i_q13.q);
-    if (c->ref_q13.q < 0) {
-        missing = (int16_t)-missing;
-    }
-    return (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
+    return qm_with_sign((int16_t)(c->ref_q13.q - c->i_q13.q), c->ref_q13.q);
+}
+
+INLINE voltage_q14_t limits_free_voltage(const drive_control_t *c, current_q13_t missing_q13)
+{
+    return (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing_q13, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
 }
 
 current_q13_t limits_asked_most(const drive_params_t *p)
@@ -29,16 +31,11 @@ static uint16_t limits_bus_is_narrower(const drive_control_t *c, speed_erpm_t sp
     return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && (c->ref_q13.q == 0 || limits_brakes(c->ref_q13.q, speed)));
 }
 
-/** 1 while the bus, and not the circle, holds the q current. */
-static uint16_t limits_bus_holds(const drive_control_t *c, speed_erpm_t speed)
-{
-    return (uint16_t)(limits_bus_is_narrower(c, speed) && qm_abs(c->ref_q13.q) == c->brake_limit_q13);
-}
-
 void limits_flux_brake(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
-    int16_t step = (int16_t)(limits_bus_holds(c, observer_speed(&run->observer)) ? FLUX_BRAKE_STEP_Q13 : -FLUX_BRAKE_STEP_Q13);
+    const uint16_t bus_holds = (uint16_t)(limits_bus_is_narrower(c, observer_speed(&run->observer)) && qm_abs(c->ref_q13.q) == c->brake_limit_q13);
+    const int16_t step = (int16_t)(bus_holds ? FLUX_BRAKE_STEP_Q13 : -FLUX_BRAKE_STEP_Q13);
     c->flux_brake_q13 = qm_clamp((int16_t)(c->flux_brake_q13 + step), 0, p->flux_brake_most_q13);
 }
 
@@ -56,17 +53,30 @@ current_q13_t limits_beside(const drive_params_t *p, uint16_t other_q13)
     return limits_circle(p->current_max_q13, p->current_max_reciprocal, other_q13);
 }
 
+/** What flows beyond the q reference while a shaft is braked at once: the current control is behind a back-EMF that falls. The limit is lower by it. */
+static void limits_leave_room(drive_control_t *c, current_q13_t beyond_q13)
+{
+    current_q13_t left_q13;
+    c->over_q13 = qm_clamp(beyond_q13, qm_mulhi_su(c->over_q13, LIMITS_OVER_STAYS_Q16), 16383);
+    left_q13 = (int16_t)(c->iq_limit_q13 - c->over_q13);
+    c->iq_limit_q13 = (int16_t)((left_q13 > 0) ? left_q13 : 0);
+}
+
 void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
-    int16_t id_max = limits_asked_most(p), id_q13;
-    fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c), estimator_speed(&run->estimator));
-    id_q13 = run->probe_id_q13;
+    const current_q13_t grown_q13 = (int16_t)(c->ref_q13.d - (p->current_max_q13 >> LIMITS_GROWS_SHIFT)); /* q current makes room first */
+    const current_q13_t missing_q13 = limits_missing(c), slack_q13 = (int16_t)(p->current_max_q13 >> LIMITS_SLACK_SHIFT);
+    current_q13_t id_q13 = run->probe_id_q13;
+    fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c, missing_q13), estimator_speed(&run->estimator));
     if (!held_angle_stands(&run->held)) { /* a rotor that stands needs none but a probe's: it would turn the vector away from q */
         id_q13 = (int16_t)(id_q13 + run->handover.id_q13 + salient_id(run, p) + run->fieldweak.trim_q13 - c->flux_brake_q13);
     }
-    c->ref_q13.d = qm_limit(id_q13, id_max);
+    c->ref_q13.d = qm_limit((int16_t)((id_q13 < grown_q13) ? grown_q13 : id_q13), limits_asked_most(p));
     c->iq_limit_q13 = limits_beside(p, (uint16_t)qm_abs(c->ref_q13.d));
+    if (missing_q13 < -slack_q13 || c->over_q13 != 0) {
+        limits_leave_room(c, (int16_t)(-missing_q13 - slack_q13));
+    }
 }
 
 current_q13_t limits_supply(drive_t *d, const drive_params_t *p)

@@ -122,7 +122,7 @@ static void model_starts_with_less_resistance(motor_model_t *model)
 void model_update(drive_t *d, const drive_params_t *p)
 {
     salient_sees_current(&d->run);
-    drive_update_model(&d->run, p, d->run.control.reference_erpm);
+    drive_update_model(&d->run, p, d->run.control.reference_erpm, observer_speed(&d->run.observer));
     if (d->run.handover.offset != 0) {
         model_starts_with_less_resistance(&d->run.model);
     }
@@ -132,7 +132,7 @@ void model_update_in_ramp(drive_t *d, const drive_params_t *p)
 {
     if (d->state == (uint16_t)DRIVE_RAMP) {
         salient_sees_forced_current(d);
-        drive_update_model(&d->run, p, p->end_erpm);
+        drive_update_model(&d->run, p, p->end_erpm, p->end_erpm);
         model_starts_with_less_resistance(&d->run.model);
     }
 }

@@ -41,7 +41,12 @@
     }
 PARAM_TABLE(CHECK_RANGE)
 
-/* One wrong value breaks several relations: they are asked only when each value alone is right, and the first of a group that fails ends it. */
+/* One wrong value breaks several relations: they are asked only when each value alone is right, and the first of a group that fails ends it.
+ * tools/make/userparams.sh has an empty OR_ELSE and with it all that fail, for it knows which of them may be one mistake. */
+#ifndef OR_ELSE
+#define OR_ELSE else
+#endif
+#define THE_OTHERS_HOLD (1 PARAM_RELATION_ALONE(HOLDS) PARAM_RELATION_SPEEDS(HOLDS) PARAM_RELATION_CURRENTS(HOLDS) PARAM_RELATION_BUS(HOLDS))
 #define RANGE_HOLDS(name, unit, min, max, value, meaning) \
     &&IS_CONSTANT(name) && IN_RANGE(name, min, max) && (!PARAM_COUNTED(unit) || IS_WHOLE(name))
 #define RANGES_HOLD (1 PARAM_TABLE(RANGE_HOLDS))
@@ -49,35 +54,25 @@ PARAM_TABLE(CHECK_RANGE)
 #define CHECK_RELATION(condition, message) CHECK_RELATION_N(__COUNTER__, condition, message)
 #define CHECK_RELATION_N(n, condition, message) CHECK_RELATION_N_(n, condition, message)
 #define CHECK_RELATION_N_(n, condition, message) \
-    else if (!(condition)) \
-        PARAM_REFUSE(relation_##n, message)
+    if (!(condition)) \
+        PARAM_REFUSE(relation_##n, message) \
+    OR_ELSE
 #define CHECK_ALONE(condition, message) \
-    if (0) { \
-    } \
-    CHECK_RELATION(condition, message)
+    CHECK_RELATION(condition, message) \
+    { \
+    }
 #define CHECK_GROUP(name, asked, ...) \
     PARAM_CHECK(name) \
     { \
-        if (!(asked)) { \
+        if (asked) { \
+            __VA_ARGS__ \
+            { \
+            } \
         } \
-        __VA_ARGS__ \
     }
-
-PARAM_CHECK(relations_alone)
-{
-    if (RANGES_HOLD) {
-        PARAM_RELATION_ALONE(CHECK_ALONE)
-    }
-}
+CHECK_GROUP(relations_alone, RANGES_HOLD, PARAM_RELATION_ALONE(CHECK_ALONE))
 CHECK_GROUP(relations_speeds, RANGES_HOLD, PARAM_RELATION_SPEEDS(CHECK_RELATION))
 CHECK_GROUP(relations_currents, RANGES_HOLD, PARAM_RELATION_CURRENTS(CHECK_RELATION))
 CHECK_GROUP(relations_bus, RANGES_HOLD, PARAM_RELATION_BUS(CHECK_RELATION))
-CHECK_GROUP(relations_rest, RANGES_HOLD PARAM_RELATION_ALONE(HOLDS) PARAM_RELATION_SPEEDS(HOLDS) PARAM_RELATION_CURRENTS(HOLDS) PARAM_RELATION_BUS(HOLDS),
-            MODE_RELATION_TABLE(CHECK_RELATION) PARAM_RELATION_REST(CHECK_RELATION))
-
-PARAM_CHECK(relations_entries)
-{
-    if (RANGES_HOLD && PARAM_INVKFI < 32767.0F && PARAM_INVKFI_FITS(0)) {
-        PARAM_RELATION_ENTRIES(CHECK_ALONE)
-    }
-}
+CHECK_GROUP(relations_rest, RANGES_HOLD && (sizeof(PARAM_TEXT(OR_ELSE)) == 1 || THE_OTHERS_HOLD), MODE_RELATION_TABLE(CHECK_RELATION) PARAM_RELATION_REST(CHECK_RELATION))
+CHECK_GROUP(relations_entries, (RANGES_HOLD && PARAM_INVKFI < 32767.0F && PARAM_INVKFI_FITS(0)), PARAM_RELATION_ENTRIES(CHECK_ALONE))

@@ -56,7 +56,9 @@
 #define CHECK_OPTIONAL(name) \
     PARAM_CHECK(text_of_##name) \
     { \
-        if (!IS_NUMBER(PARAM_TEXT(name))) \
+        if (IS_EMPTY(PARAM_TEXT(name))) \
+            PARAM_REFUSE(empty_##name, #name " has no value: remove the line, or write a number") \
+        else if (!IS_NUMBER(PARAM_TEXT(name))) \
             PARAM_REFUSE(not_##name, #name " = " PARAM_TEXT(name) " is no number: remove the line, or write a number" HOW) \
     }
 #define CHECK_MODE(name, meaning) \

@@ -1,4 +1,4 @@
-/* Protection: the conditions that the control interrupt finds itself and that end in a fault. */
+/* Protection: the conditions that end in a fault and need no signal's model: currents, bus, rotor, heat. */
 #include "drive/protection.h"
 
 #include "drive/drive.h"
@@ -32,17 +32,23 @@ void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, 
     drive_raise(d, found);
 }
 
+/** How much of the back-EMF may be R i: by what R may be more than is known, or less where the back-EMF brakes. @return Q27 */
+static int32_t protection_ri_off_q27(const drive_run_t *run, const drive_params_t *p)
+{
+    const int16_t rs = qm_hi(run->adaptation.rs_q31), iq_q13 = run->control.i_q13.q;
+    const int16_t off = (int16_t)(limits_brakes(iq_q13, estimator_emf(&run->estimator).q) ? rs - p->rs_off_least : p->rs_off_most - rs);
+    return qm_mulss(model_header_ri(p, qm_abs(iq_q13)), off);
+}
+
 #define PROTECTION_TURN_SHIFT 4 /* the angle step of a period to that of eight: ls_q16 is L of eight samples */
 
 uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_params_t *p)
 {
     dq_t i = run->control.i_q13, emf = estimator_emf(&run->estimator);
-    int16_t e_q12 = qm_abs(emf.q), rs = qm_hi(run->adaptation.rs_q31), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
-    int16_t r_more = (int16_t)(limits_brakes(i.q, emf.q) ? rs - p->rs_off_least : p->rs_off_most - rs);
-    int16_t ri_q12 = model_header_ri(p, qm_abs(i.q));
+    int16_t e_q12 = qm_abs(emf.q), more = (int16_t)(p->kfi_impossible - qm_hi(run->adaptation.kfi_q31));
     uint16_t turned_q13 = (uint16_t)((uint16_t)qm_abs(qm_mulhi(i.d, run->estimator.half_step_q16_rad)) << PROTECTION_TURN_SHIFT);
     uint32_t li_q12 = (qm_muluu(turned_q13, run->model.ls_q16) >> 16) << p->estimator.ls_exp;
-    int32_t parts_q27 = qm_mulss(ri_q12, r_more) + qm_mulss((int16_t)((li_q12 > 32767ul) ? 32767ul : li_q12), p->ls_off);
+    int32_t parts_q27 = protection_ri_off_q27(run, p) + qm_mulss((int16_t)((li_q12 > 32767ul) ? 32767ul : li_q12), p->ls_off);
     return (uint16_t)(qm_mulss(e_q12, more) - ((int32_t)p->dead_emf_q12 << 15) > parts_q27);
 }
 
@@ -65,9 +71,8 @@ void protection_check_model(drive_t *d, const drive_params_t *p)
 
 uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p)
 {
-    int16_t r_more = (int16_t)(p->rs_off_most - qm_hi(run->adaptation.rs_q31));
     int16_t less_q12 = (int16_t)(qm_abs(estimator_emf(&run->estimator).q) - p->adaptation.emf_least_q12);
-    return (uint16_t)(less_q12 <= qm_hi(2 * qm_mulss(model_header_ri(p, qm_abs(run->control.i_q13.q)), r_more)));
+    return (uint16_t)(less_q12 <= qm_hi(2 * protection_ri_off_q27(run, p)));
 }
 
 current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t *p)
@@ -230,3 +235,110 @@ uint16_t overload_tick(overload_t *o, const drive_t *d, const drive_params_t *p,
     }
     return (uint16_t)(runs && o->heat_q25 >= p->i2t_most_q25);
 }
+
+/* ---- Temperatures of motor and bridge by NTC thermistors: what they leave of the driving current, when they trip, and what a broken sensor does ---- */
+
+#if HEAT_USED
+int16_t ntc_celsius(const ntc_params_t *p, uint16_t share_q16)
+{
+    uint16_t node = 1, below, span, above = 0;
+    while (node < NTC_NODES - 1u && share_q16 < p->share_q16[node]) {
+        node++;
+    }
+    below = p->share_q16[node];
+    span = (uint16_t)(p->share_q16[node - 1u] - below);
+    if (share_q16 > below) {
+        above = (uint16_t)(share_q16 - below);
+    }
+    if (above >= span) {
+        above = (uint16_t)(span - 1u);
+    }
+    return (int16_t)(16 * (NTC_LEAST_C + NTC_STEP_C * (int16_t)node) - (qm_share(above, span) >> 7)); /* 2^15 are 16 * NTC_STEP_C */
+}
+
+/** 1 where no temperature is. */
+static uint16_t ntc_is_at_an_end(uint16_t share_q16)
+{
+    return (uint16_t)(share_q16 >= NTC_OPEN_Q16 || share_q16 <= NTC_SHORTED_Q16);
+}
+
+void ntc_sample(ntc_t *ntc, const ntc_params_t *p, int16_t sample_q15)
+{
+    const int16_t trip_q4 = (int16_t)(p->trip_q4 - (ntc->is_hot ? HEAT_COOLER_Q4 : 0));
+    if (ntc_is_at_an_end((uint16_t)((uint16_t)sample_q15 ^ 0x8000u))) {
+        if (ntc->broken < NTC_BROKEN_SAMPLES) {
+            ntc->broken++;
+        }
+        return;
+    }
+    if (ntc->broken != 0u) {
+        ntc->broken--;
+    }
+    if (!ntc->is_known) {
+        ntc->smooth_q31 = (int32_t)sample_q15 * 65536;
+        ntc->is_known = 1;
+    }
+    ntc->celsius_q4 = ntc_celsius(p, (uint16_t)((uint16_t)qm_lowpass(&ntc->smooth_q31, sample_q15, NTC_FOLLOWS_Q16) ^ 0x8000u));
+    ntc->is_hot = (uint16_t)(ntc->celsius_q4 >= trip_q4);
+}
+
+current_q13_t ntc_derated(const ntc_params_t *ntc, const drive_params_t *p, int16_t celsius_q4)
+{
+    const int16_t over_q4 = (int16_t)(celsius_q4 - ntc->derate_q4), least = (int16_t)(p->current_max_q13 / DERATE_LEAST);
+    int32_t most = p->current_max_q13;
+    if (over_q4 > 0) {
+        most -= qm_mulss(over_q4, ntc->derate_per_q4_q8) >> 8;
+    }
+    return (int16_t)((most < least) ? least : most);
+}
+
+/** What the sensors say together. */
+typedef struct {
+    current_q13_t most_q13;
+    uint16_t found; /* drive_fault_t */
+} judged_heat_t;
+
+/** What one of them says. @param hot its fault when it is too hot */
+static void ntc_judge(judged_heat_t *now, const ntc_t *ntc, const ntc_params_t *its, const drive_params_t *p, drive_fault_t hot)
+{
+    const current_q13_t most = ntc_derated(its, p, ntc->celsius_q4);
+    if (most < now->most_q13) {
+        now->most_q13 = most;
+    }
+    if (ntc->broken == NTC_BROKEN_SAMPLES) {
+        now->found = (uint16_t)FAULT_NTC_SENSOR;
+    } else if (ntc->is_hot) {
+        now->found = (uint16_t)hot;
+    } else { /* nothing to say */
+    }
+}
+
+uint16_t heat_follow(drive_t *d, const drive_params_t *p)
+{
+    judged_heat_t now = { p->current_max_q13, (uint16_t)FAULT_NONE };
+#if BRIDGE_NTC_USED
+    ntc_judge(&now, &d->heat.bridge, &p->bridge_ntc, p, FAULT_BRIDGE_HOT);
+#endif
+#if MOTOR_NTC_USED
+    ntc_judge(&now, &d->heat.motor, &p->motor_ntc, p, FAULT_MOTOR_HOT);
+#endif
+    d->heat.most_q13 = now.most_q13;
+    d->heat.held = now.found;
+    return now.found;
+}
+
+void heat_init(drive_t *d, const drive_params_t *p)
+{
+    d->heat.most_q13 = p->current_max_q13;
+}
+
+current_q13_t heat_most(const drive_t *d)
+{
+    return d->heat.most_q13;
+}
+
+uint16_t heat_holds(const drive_t *d)
+{
+    return (uint16_t)(d->heat.held != (uint16_t)FAULT_NONE && d->heat.held == d->fault);
+}
+#endif

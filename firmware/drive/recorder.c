@@ -95,7 +95,7 @@ void recorder_begin(recorder_t *r)
     drive_zero(r, sizeof *r); /* the test of the RAM reads it all */
     r->check = RECORDER_CHECK;
     r->next = RECORDER_FIRST;
-    r->left = RECORDER_AFTER + 1u; /* last: from now on the control interrupt writes */
+    r->left = RECORDER_AFTER + 1u; /* last: from now on the slow work writes */
 }
 
 /** Whether a reset has left a recorder and no chance content of RAM. */

@@ -14,8 +14,9 @@ static void observe_load(drive_t *d, const drive_params_t *p, const drive_sample
     mode_sine_step(&d->run);
     if (drive_is_closed(d)) {
         handover_observe(&d->run, p);
-    } else if (MODE_ALIGNS) { /* else the mode turns the rotor */
+    } else if (MODE_ALIGNS && drive_is_running(d)) { /* else the mode turns the rotor */
         states_start_step(d, p);
+    } else { /* it does, or the bridge is off */
     }
 }
 

@@ -39,8 +39,8 @@ static uint16_t signals_voltage_is_unexplained(const drive_run_t *run, const dri
 static uint16_t signals_stop_is_blurred(const drive_t *d, const drive_params_t *p)
 {
     return (uint16_t)(d->state == (uint16_t)DRIVE_STOPPING && !d->command.run
-                      && (qm_abs(estimator_emf(&d->run.estimator).q) >> SIGNALS_BLUR_SHIFT) < p->dead_emf_q12
-                      && qm_abs(d->run.control.ref_q13.q) < p->id_off_q13);
+                      && !qm_beyond(estimator_emf(&d->run.estimator).q, (int16_t)(SIGNALS_BLUR_TIMES * p->dead_emf_q12 - 1))
+                      && !qm_beyond(d->run.control.ref_q13.q, (int16_t)(p->id_off_q13 - 1)));
 }
 
 /** Currents that do not fit the motor, with or without a phase that carries hardly any. */
@@ -92,11 +92,11 @@ static NOINLINE uint32_t signals_beat(const signals_beat_t *sum)
     return (uint32_t)((sum->cosine < 0) ? -sum->cosine : sum->cosine) + (uint32_t)((sum->sine < 0) ? -sum->sine : sum->sine);
 }
 
-/** 1 where only a wrong signal can be behind it. */
-static uint16_t signals_prove(const signals_evidence_t *e, const drive_params_t *p)
+/** 1 where it swings with the field, as only a wrong signal does. */
+static uint16_t signals_swing(const signals_evidence_t *e)
 {
     const uint32_t least = e->size / 2u + e->size / 8u;
-    return (uint16_t)(signals_beat(&e->once) > least || signals_beat(&e->twice) > least || e->size > qm_muluu(e->checks, p->load_erpm) || e->unexplained > e->checks / 2u);
+    return (uint16_t)(signals_beat(&e->once) > least || signals_beat(&e->twice) > least);
 }
 
 /** Begins anew; member by member, for the longest path knows of no loop over bytes. */
@@ -147,19 +147,22 @@ void signals_check(drive_t *d, const drive_params_t *p)
 void signals_judge(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    if (run->observer.wrong_steps <= p->wrong_steps) {
-        if (run->evidence.checks > SIGNALS_CHECKS_MOST) { /* what comes and goes has no end */
-            signals_fade(&run->evidence);
+    signals_evidence_t *e = &run->evidence;
+    const uint16_t goes_on = (uint16_t)(run->observer.wrong_steps > p->wrong_steps);
+    /* a swing of fast turns need not go on: no load's step lasts for a turn of the field, and a shaken observer answers slowly */
+    const uint16_t swings = (uint16_t)((goes_on || (e->checks > p->wrong_steps && qm_beyond(observer_speed(&run->observer), SIGNALS_TURN_ERPM / SPEED_UNIT)))
+                                       && signals_swing(e));
+    if (!goes_on && !swings) {
+        if (e->checks > SIGNALS_CHECKS_MOST) { /* what comes and goes has no end */
+            signals_fade(e);
         }
-        return;
-    }
-    if (signals_stop_is_blurred(d, p)) {
+    } else if (signals_stop_is_blurred(d, p)) {
         drive_enter(d, DRIVE_STOPPED); /* as at a stop's end: the bridge goes off and the rotor runs out */
-    } else if (signals_prove(&run->evidence, p)) {
-        drive_raise(d, signals_which_is_wrong(run->evidence.phases));
+    } else if (swings || e->size > qm_muluu(e->checks, p->load_erpm) || e->unexplained > e->checks / 2u) {
+        drive_raise(d, signals_which_is_wrong(e->phases)); /* only a wrong signal can be behind it */
     } else {
         run->observer.wrong_steps >>= 1;
-        signals_fade(&run->evidence);
+        signals_fade(e);
     }
 }
 
@@ -218,10 +221,7 @@ uint16_t signals_phases(signals_t *s, const drive_t *d, const drive_params_t *p)
     s->sampled_tick = now;
     signals_add(&s->sums, d);
     s->sums.samples++;
-    if (s->sums.samples < SIGNALS_SAMPLES) {
-        return (uint16_t)FAULT_NONE;
-    }
-    return (uint16_t)(signals_lack_a_phase(&s->sums, p) ? FAULT_OPEN_PHASE : FAULT_NONE);
+    return (uint16_t)((s->sums.samples >= SIGNALS_SAMPLES && signals_lack_a_phase(&s->sums, p)) ? FAULT_OPEN_PHASE : FAULT_NONE);
 }
 
 uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t *p)

@@ -118,7 +118,7 @@ void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
     drive_zero(&d->dead_second, sizeof d->dead_second);
     drive_zero(run, sizeof *run);
     d->angle = 0;
-    drive_update_model(run, p, p->end_erpm);
+    drive_update_model(run, p, p->end_erpm, p->end_erpm);
     run->control.iq_limit_q13 = p->current_max_q13;
     if (p->supply_limit_q13 != 0) {
         run->control.supply_q13 = p->current_max_q13;

@@ -13,7 +13,7 @@
 /** The drive's parameters, from userparams.h. */
 extern MODE_PARAMS_PLACE drive_params_t board_params;
 
-/** The drive; the control interrupt runs it, the background only writes its commands. */
+/** The drive; the interrupts run it, the background writes its commands and raises faults. */
 extern drive_t board_drive;
 
 /** What is wished of the drive. */

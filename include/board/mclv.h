@@ -21,8 +21,8 @@
 #define BOARD_PIN_S2 A, 8         /* S2, low when pressed; published code */
 #define BOARD_PIN_S3 B, 4         /* S3, low when pressed; published code */
 #define BOARD_PIN_FAULT B, 8      /* FLTA1, the over-current comparator, low on a fault; published code */
-#define BOARD_PIN_UART_TX C, 3    /* serial line, transmits at 115200 baud; [?] try C, 5 (RP21) first if no line comes */
-#define BOARD_OTHER_TX C, 5       /* BRINGUP tries this one, too */
+#define BOARD_PIN_UART_TX C, 3    /* serial line, transmits at 115200 baud; [?] if no line comes, swap it with BOARD_OTHER_TX, RP21 */
+#define BOARD_OTHER_TX C, 5       /* BRINGUP tries this one, too: never the same pin */
 #define BOARD_PIN_UART_RX C, 4    /* serial line, receives; one other program for this board, its board unknown [?] */
 #define BOARD_PIN_LED_ALIVE C, 6  /* LED: alive, fault code; [?] a free pin until it is known */
 #define BOARD_PIN_LED_RUN C, 7    /* LED: running; [?] a free pin until it is known */
@@ -45,11 +45,11 @@
 PIN_NEEDS(currents_and_bus_are_AN0_to_2_or_AN3_to_5,
           (PIN_AN(BOARD_PIN_CURRENT_A) == 0 || PIN_AN(BOARD_PIN_CURRENT_A) == 3) && PIN_AN(BOARD_PIN_CURRENT_B) == PIN_AN(BOARD_PIN_CURRENT_A) + 1
               && PIN_AN(BOARD_PIN_BUS) == PIN_AN(BOARD_PIN_CURRENT_A) + 2);
-PIN_NEEDS(potentiometer_has_an_AN_number, PIN_AN(BOARD_PIN_POT) >= 0);
-PIN_NEEDS(temperatures_have_AN_numbers, PIN_AN(BOARD_PIN_MOTOR_NTC) >= 0 && PIN_AN(BOARD_PIN_BRIDGE_NTC) >= 0);
+PIN_NEEDS(potentiometer_and_NTCs_have_AN_numbers, PIN_AN(BOARD_PIN_POT) >= 0 && PIN_AN(BOARD_PIN_MOTOR_NTC) >= 0 && PIN_AN(BOARD_PIN_BRIDGE_NTC) >= 0);
 PIN_NEEDS(fault_input_has_an_RP_number, PIN_RP(BOARD_PIN_FAULT) >= 0);
 PIN_NEEDS(direction_input_has_a_pull_up, !(DIRECTION_INPUT_USED) || PIN_CN(BOARD_PIN_DIRECTION) >= 0);
 PIN_NEEDS(serial_line_has_RP_numbers, PIN_RP(BOARD_PIN_UART_TX) >= 0 && PIN_RP(BOARD_PIN_UART_RX) >= 0);
+PIN_NEEDS(BOARD_OTHER_TX_is_another_pin_with_an_RP_number, PIN_RP(BOARD_OTHER_TX) >= 0 && PIN_RP(BOARD_OTHER_TX) != PIN_RP(BOARD_PIN_UART_TX));
 PIN_NEEDS(pulses_have_an_RP_number, PIN_RP(BOARD_PIN_PULSE) >= 0);
 
 #ifdef __XC16__

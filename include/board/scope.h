@@ -25,7 +25,7 @@ typedef enum {
 
 /** The scope. The background changes it in SCOPE_IDLE only, and the mode last. */
 typedef struct {
-    volatile int16_t mode;                                /**< scope_mode_t; the control interrupt ends it */
+    volatile int16_t mode;                                /**< scope_mode_t; the slow work ends it */
     uint16_t wait, periods;                               /**< until the next row, and from row to row */
     int16_t looking;                                      /**< mode while the trigger is looked for */
     int16_t then;                                         /**< mode after the trigger's row: SCOPE_IDLE if it is the last */

@@ -7,6 +7,8 @@
 
 #include <stdint.h>
 
+#define FOC33_VERSION "0.10.0" /**< the newest one in CHANGELOG.md */
+
 /** The first line, version and cause of the last reset: "foc33 0.10.0 reset BOR POR". */
 void status_init(void);
 
@@ -41,7 +43,7 @@ const char *text_next(const char *name);
 
 /* ---- The fault recorder on the board: the one recorder, and its rows as lines for the UART ---- */
 
-/** The control interrupt writes it; kept over every reset but power-up. */
+/** The slow work writes it; kept over every reset but power-up. */
 extern recorder_t board_recorder;
 
 /** After reset_take(). @param kept the fault that the firmware starts with */

@@ -25,7 +25,7 @@ typedef int16_t current_q14_t; /**< alpha and beta currents: 16384 = full-scale 
 typedef int16_t voltage_q14_t; /**< d and q voltages: 16384 = full-scale voltage */
 typedef int16_t voltage_q13_t; /**< alpha and beta voltages and back-EMF: 8192 = full-scale voltage */
 typedef int16_t voltage_q12_t; /**< d and q back-EMF: 4096 = full-scale voltage (4 times the range of Q14) */
-typedef int16_t speed_erpm_t;  /**< counts of electrical revolutions per minute, AN1292's speed unit: 1, or SPEED_UNIT (drive/param_scaling.h) of a quick motor */
+typedef int16_t speed_erpm_t;  /**< counts of electrical revolutions per minute, AN1292's speed unit: 1, or SPEED_UNIT (drive/scaling/current_voltage.h) of a quick motor */
 typedef uint16_t angle_t;      /**< 65536 = one electrical turn; wraps on purpose */
 typedef int16_t q15_t;         /**< fraction, 32768 = 1 */
 typedef uint16_t duty_t;       /**< PWM on-time of the high side, 2000 = 100 % at 20 kHz */
@@ -150,10 +150,12 @@ QM_INLINE int32_t qm_clamp_hi(int32_t x, int16_t low, int16_t high)
 /** Magnitude; -32768 gives 32767. */
 QM_INLINE int16_t qm_abs(int16_t x)
 {
+    uint16_t size;
     if (x >= 0) {
         return x;
     }
-    return (int16_t)((x == INT16_MIN) ? INT16_MAX : -x);
+    size = (uint16_t)((uint16_t) ~(uint16_t)x + 1u);
+    return (int16_t)(size - ((size > (uint16_t)INT16_MAX) ? 1u : 0u)); /* no choice between two values: XC16 would branch on neg's flags, wrong at -32768 */
 }
 
 /** most with the sign of x. @param most not negative */

@@ -52,6 +52,9 @@
 #define FIELDWEAK_TRIM_SHIFT 3      /* [shift] counts of d current a step per 8 counts of missing voltage | run SCENARIO=demo */
 #define LIMITS_MISSING_Q14 4        /* [Q14/Q13] voltage counts that a count of missing q current asks for | run SCENARIO=demo */
 #define LIMITS_MISSING_MOST_Q13 64  /* [Q13 A] missing q current that counts at most | run SCENARIO=demo */
+#define LIMITS_GROWS_SHIFT 3        /* [shift] d current grows by 1/8 of the largest current in 16 periods, while the q current makes room | soak */
+#define LIMITS_SLACK_SHIFT 4        /* [shift] q current may be beyond its reference by 1/16 before its limit falls | soak */
+#define LIMITS_OVER_STAYS_Q16 57344u /* [Q16] of what was beyond 7/8 still count after 16 periods | soak */
 #define FLUX_BRAKE_STEP_Q13 32     /* [Q13 A] a step of the d current that burns: MAXIMUM_CURRENT_A takes a twentieth of a second | run SCENARIO=stop_from_top */
 #define FLUX_BRAKE_DEAD_SHARE 0.5         /* [1] of dead time's voltage, which R at full current must exceed for d current to burn anything | catch */
 #define ASKED_LESS_SHIFT 5          /* [shift] of MAXIMUM_CURRENT_A 1/32 is left to what the current controllers overshoot | run SCENARIO=demo */
@@ -68,7 +71,7 @@
 #define PARAM_LOADED_SHARE 0.3      /* [1] rate under load over LOAD_BANDWIDTH_HZ | loadsteps */
 #define PARAM_FULL_RATIO 2.7        /* [1] LOAD_BANDWIDTH_HZ over the electrical frequency from which rates and gain are in full | lowspeed */
 #define PARAM_LOAD_FROM_LOST 5      /* [1] times the current that dead time loses: the load that begins to count | loadsteps */
-#define GATE_SHARE 0.13            /* [1] of dead time's voltage, as a speed: a large innovation without load | loadsteps */
+#define GATE_SHARE 0.13            /* [1] of dead time's voltage, as a speed: a large innovation without load; twice it is a wrong signal's | loadsteps */
 #define GATE_LOADED_SHARE 0.03     /* [1] and under load | loadsteps */
 #define OBSERVER_GATE_SPEED_SHIFT 5 /* [shift] and 1/32 of the speed more | loadsteps */
 #define OBSERVER_FAST_HALF_Q15 12288     /* [Q15] so quick up to one and a half of what is large: dead time may be behind it | loadsteps */
@@ -122,12 +125,13 @@
 #define HELD_DOUBTS_MOST 5u   /* [1] steps of 16 periods, below half the reference, that look like a held rotor: then the angle stands | loadsteps */
 #define HELD_DOUBTS_FAR 3u    /* [1] below an eighth of the reference a step counts as many | held */
 #define HELD_DOUBTS_SWINGS 40u /* [1] and where the speed swings, for then it is so slow in each turn | pulse */
-#define HELD_LAG_SHIFT 4      /* [shift] of what the back-EMF's filter is behind 1/16 is forgotten a step | held */
+#define HELD_LAG_SHIFT 2      /* [shift] of what the back-EMF's filter is behind 1/4 is forgotten a step, before a rotor is doubted | held */
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
+#define HELD_FAR_SHIFT 3         /* [shift] and 1/8 of the largest current as d current, which goes as the angle stops | soak */
 #define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
 #define HELD_TURNED_RAD 0.175 /* [rad] ten degrees, electrical, by what its back-EMF gained: so far no shaft that is held goes | loadsteps */
 #define HELD_PULL_ANGLE 182   /* [2^-16 turn] a degree a step, by which all of the current pulls a rotor that stands | loadsteps */
-#define HELD_PULL_STEPS 32u   /* [steps] 32 degrees: a load may have stopped it so far ahead of the frame | loadsteps */
+#define HELD_PULL_STEPS 32u   /* [steps] 32 degrees, and back: a load may have stopped it so far ahead of the frame, or behind | loadsteps */
 #define HELD_REST_STEPS 2u    /* [steps] of 16 periods that a frame that was turned back takes to settle | loadsteps */
 #define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */
 #define HELD_ASK_MOST_STEPS 32u /* [steps] of 16 periods, for a back-EMF too small to tell sooner | lowspeed */
@@ -151,7 +155,7 @@
 #define SIGNALS_UNEXPLAINED 2u      /* [steps] so many wrong innovations is an unexplained voltage | run SCENARIO=fault_open_phase */
 #define SIGNALS_STANDS_SHIFT 2      /* [shift] below a quarter of the reference an innovation is in time with nothing | pulse */
 #define SIGNALS_OPEN_SHIFT 2        /* [shift] an open phase carries less than a quarter of its share, in both rules | run SCENARIO=fault_open_phase */
-#define SIGNALS_BLUR_SHIFT 2        /* [shift] dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below | run SCENARIO=stop_from_top */
+#define SIGNALS_BLUR_TIMES 4        /* [1] dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below | run SCENARIO=stop_from_top */
 #define PROBE_WAIT_STEPS 13         /* [32 periods] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */
 #define PROBE_STEPS 25              /* [32 periods] a probe takes 40 ms: more than the estimator's filters at the lowest speed | run SCENARIO=fault_stall */
 #define PROBE_DIP_STEPS 6           /* [32 periods] or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long | run SCENARIO=fault_stall */
@@ -166,7 +170,7 @@
 #define SIGNALS_MEAN_SHIFT 9        /* [shift] its mean is one over 512 ms | campaign */
 #define SIGNALS_TURNS_MS 256u       /* [ms] from here on a whole turn ends the sum of back-EMF: angles that are wrong at its ends count less and less | campaign */
 #define SIGNALS_FLOWS_Q13 96       /* [Q13 A] six steps of the converter: where less flows one of them leaves up to a fifth of dead time's voltage more | campaign */
-#define SIGNALS_TURN_ERPM 6000      /* [erpm] faster turns have fewer than ten looks each, and looks that meet the same angles again would sum up | campaign */
+#define SIGNALS_TURN_ERPM 6000      /* [erpm] faster turns have fewer than ten looks each, and looks that meet the same angles again would sum up; of them a tenth of a second is judged | campaign */
 #define SIGNALS_SAMPLES 64u         /* [samples] of the phases' currents that are compared, some 62 ms | run SCENARIO=fault_open_phase */
 
 /* clang-format on */

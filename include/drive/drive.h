@@ -7,11 +7,10 @@
 #include "control/observer.h"
 #include "control/svm.h"
 #include "drive/catch.h"
-#include "drive/handover.h"
-#include "drive/heat.h"
 #include "drive/held.h"
 #include "drive/model.h"
 #include "drive/modes/modes.h"
+#include "drive/protection.h"
 #include "drive/selftest.h"
 #include "drive/signals.h"
 #include "drive/startup.h"
@@ -52,7 +51,7 @@ struct drive_params {
     int32_t i2t_most_q25;               /**< square of I2T_CURRENT_A; 0: no I2t */
     uint16_t i2t_rate_q16;              /**< OVERLOAD_STEP_MS / I2T_TIME_SEC */
     uint16_t bus_shift;                 /**< 1..3: bus_q15 shifted by it fills a word */
-    uint16_t voltage_limit_per_bus_q16; /**< see param_scaling.h */
+    uint16_t voltage_limit_per_bus_q16; /**< see scaling/current_voltage.h */
     uint32_t duty_per_volt_numerator;
     int16_t bus_over_q15, bus_under_q15; /**< trip levels */
     int16_t bus_used_q15;                /**< most of it that the law makes use of: the formats end */
@@ -101,6 +100,7 @@ typedef struct {
     current_q13_t iq_limit_q13;    /**< sqrt(Imax^2 - Id^2); of a driving current also what supply and bus allow */
     current_q13_t supply_q13;      /**< q current that the supply's limit allows, damped */
     uint16_t limited_by;           /**< the reason for an iq_limit_q13 below the circle, limit_reason_t */
+    current_q13_t over_q13;        /**< q current beyond its reference, for which its limit is lower */
     current_q13_t brake_limit_q13; /**< largest braking current, from the bus */
     current_q13_t flux_brake_q13;  /**< d current that burns what the bus does not take, 0 or more */
     dq_t i_q13;                    /**< measured currents in the control frame */
@@ -176,8 +176,9 @@ void drive_zero(void *object, uint16_t size);
 /** Brings the object to CALIBRATE; every field gets its start value. */
 void drive_init(drive_t *d, const drive_params_t *p);
 
-/** The motor's constants for a speed reference: the tables, and what the motor has shown. */
-void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm);
+/** The motor's constants for a speed reference: the tables, and what the motor has shown. @param speed_erpm of the rotor: one that was
+ *  asked whether it stands gets field weakening for no more than twice this, until it is at half of the reference */
+void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm, speed_erpm_t speed_erpm);
 
 /** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
  *  @param direction +1 or -1 */

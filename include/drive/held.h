@@ -20,19 +20,19 @@ typedef enum {
 } held_phase_t;
 
 /** What follows from a step, a while later: each of them takes a slot of its own. */
-typedef enum {
+enum {
     HELD_WAITS,      /**< nothing */
     HELD_STOP,       /**< the angle stops */
     HELD_HAS_TURNED, /**< the rotor has turned all the time */
     HELD_LEARN,      /**< the rotor stands: all of the back-EMF is R i */
     HELD_TURN_BACK,  /**< the frame turns back by what R i had turned it */
     HELD_GOES_ON     /**< it stood, and turns now */
-} held_act_t;
+};
 
 /** A rotor that may be held. A step is two of the load observer's, 16 periods. Zero is a valid start. */
 typedef struct {
     uint16_t phase;          /**< held_phase_t; written by held_enter() only */
-    uint16_t act;            /**< held_act_t that waits for the rotor's next step */
+    uint16_t act;            /**< HELD_WAITS .. HELD_GOES_ON: what waits for the rotor's next step */
     uint16_t steps;          /**< in the phase */
     uint16_t doubts;         /**< steps that look like a held rotor; a rotor far below its reference counts three */
     uint16_t doubted_steps;  /**< since then */
@@ -52,6 +52,9 @@ uint16_t held_angle_stands(const held_t *shaft);
 
 /** Begins anew: the angle turns, and nothing is known of the rotor. For a ramp that follows the closed loop, and for any start. */
 void held_forget(held_t *shaft);
+
+/** The speed whose field weakening is used: a rotor below half of the reference needs that of twice its speed, or none. Both are not negative. */
+speed_erpm_t held_weakened_for(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t speed);
 
 /** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter, y += K (x - y), went on turning it by w/K periods' turns, w the
  *  speed that is in the filter alone. After held_t has its inv_kfi. @param lag_q12 see held_t @return angle counts, half a turn at most */

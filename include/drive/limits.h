@@ -45,8 +45,8 @@
 typedef enum { DRIVE_LIMIT_TABLE(DRIVE_LIMIT_ENUM) LIMIT_NONE = 0 } limit_reason_t;
 
 /** Voltage that the q axis has left, less what the missing q current asks for: a limit that is only touched now and then takes no more d
- *  current than it must, and one that costs speed takes what it needs. */
-voltage_q14_t limits_free_voltage(const drive_control_t *c);
+ *  current than it must, and one that costs speed takes what it needs. @param missing_q13 q current, in its reference's direction */
+voltage_q14_t limits_free_voltage(const drive_control_t *c, current_q13_t missing_q13);
 
 /** Most that the d axis and braking ask for: what the current controllers overshoot stays within MAXIMUM_CURRENT_A. */
 current_q13_t limits_asked_most(const drive_params_t *p);

@@ -57,7 +57,7 @@
     X(I2T_TIME_SEC, "s", 2, 1000, FROM_MOTOR, "the winding's thermal time constant") \
     X(SUPPLY_CURRENT_LIMIT_A, "A", 0, 20, 0, "what the running motor may draw from the supply, in the mean; 0: no limit of its own")
 
-#define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/param_scaling.h */ \
+#define PARAM_LOOPS(X) /* Control loops: bandwidths; AN1292's D_CURRCNTR_PTERM ... may be defined instead, see drive/scaling/controllers.h */ \
     X(CURRENT_BANDWIDTH_HZ, "Hz", 20, 2000, FROM_TUNER, "both current loops") \
     X(SPEED_BANDWIDTH_HZ, "Hz", 0.2, 60, FROM_TUNER, "speed loop") \
     X(LOAD_BANDWIDTH_HZ, "Hz", 1, 200, FROM_TUNER, "load observer after a load step; slower under a steady load, slowest without one")
@@ -146,8 +146,9 @@
 
 /** Whether userparams.h defines a name: the preprocessor leaves any other as it is. */
 #define PARAM_GIVEN(name) (__builtin_strcmp(#name, PARAM_TEXT(name)) != 0)
+#define PARAM_SAME(name, other) (__builtin_strcmp(PARAM_TEXT(name), PARAM_TEXT(other)) == 0) /* one is the other's value */
 
-/** X(name): what userparams.h may define, too; otherwise drive/param_scaling.h computes it. */
+/** X(name): what userparams.h may define, too; otherwise drive/scaling/ computes it. */
 #define PARAM_OPTIONAL(X) \
     X(BRIDGE_RS_OHM) X(D_CURRCNTR_PTERM) X(D_CURRCNTR_ITERM) X(D_CURRCNTR_CTERM) \
     X(Q_CURRCNTR_PTERM) X(Q_CURRCNTR_ITERM) X(Q_CURRCNTR_CTERM) X(SPEEDCNTR_PTERM)
@@ -159,11 +160,10 @@
      || __builtin_strcmp(unit, "uH") == 0 || __builtin_strcmp(unit, "Q15") == 0 || __builtin_strcmp(unit, "count/1024/period") == 0)
 
 /** X(condition, message): what must hold between parameters, and what to change when it does not. Of a group in which one wrong value breaks
- *  several, the build tells the first; PARAM_RELATION_REST is asked only where the groups before it hold. */
+ *  several, the compiler tells the first; PARAM_RELATION_REST is asked only where the groups before it hold. The build chooses better (messages.awk). */
 #define PARAM_RELATION_TABLE(X) PARAM_RELATION_ALONE(X) PARAM_RELATION_SPEEDS(X) PARAM_RELATION_CURRENTS(X) PARAM_RELATION_BUS(X) PARAM_RELATION_REST(X) \
     PARAM_RELATION_ENTRIES(X)
 
-/* Each is told. */
 #define PARAM_RELATION_ALONE(X) \
     X(PARAM_PWM_REST < 0.01F, \
       PARAM_NAMED(LOOPTIME_SEC) " must be a multiple of 50 ns, as 0.00005 is: the PWM counts up and down in steps of 25 ns") \
@@ -173,14 +173,16 @@
     X(RECORDER_PERIODS != 1 && ((int)(RECORDER_PERIODS) & ((int)(RECORDER_PERIODS) - 1)) == 0, \
       PARAM_NAMED(RECORDER_PERIODS) " must be 0, 2, 4, 8, 16, 32 or 64: the periods are counted in bits") \
     X(PARAM_F(BRIDGE_RS_OHM) >= 0.0F && PARAM_F(BRIDGE_RS_OHM) <= 1.0F, \
-      "BRIDGE_RS_OHM must be 0 .. 1 ohm: the on-resistance of a transistor and half of the shunt's") \
+      PARAM_NAMED(BRIDGE_RS_OHM) " must be 0 .. 1 ohm: the on-resistance of a transistor and half of the shunt's") \
     X(PARAM_F(D_CURRCNTR_CTERM) >= 0.9F && PARAM_F(D_CURRCNTR_CTERM) < 1.0F, \
-      "D_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
+      PARAM_NAMED(D_CURRCNTR_CTERM) " must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
     X(PARAM_F(Q_CURRCNTR_CTERM) >= 0.9F && PARAM_F(Q_CURRCNTR_CTERM) < 1.0F, \
-      "Q_CURRCNTR_CTERM must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
-    X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F && PARAM_F(Q_CURRCNTR_PTERM) > 0.0F && PARAM_F(SPEEDCNTR_PTERM) > 0.0F, \
-      "the controllers' PTERMs must be positive") \
-    X(PARAM_F(D_CURRCNTR_ITERM) >= 0.0F && PARAM_F(Q_CURRCNTR_ITERM) >= 0.0F, "the current controllers' ITERMs must not be negative") \
+      PARAM_NAMED(Q_CURRCNTR_CTERM) " must be 0.9 .. 0.9999: it keeps the integrator in its limits") \
+    X(PARAM_F(D_CURRCNTR_PTERM) > 0.0F, PARAM_NAMED(D_CURRCNTR_PTERM) " must be positive") \
+    X(PARAM_F(SPEEDCNTR_PTERM) > 0.0F, PARAM_NAMED(SPEEDCNTR_PTERM) " must be positive") \
+    X(PARAM_F(Q_CURRCNTR_PTERM) > 0.0F || PARAM_SAME(Q_CURRCNTR_PTERM, D_CURRCNTR_PTERM), PARAM_NAMED(Q_CURRCNTR_PTERM) " must be positive") \
+    X(PARAM_F(D_CURRCNTR_ITERM) >= 0.0F, PARAM_NAMED(D_CURRCNTR_ITERM) " must not be negative") \
+    X(PARAM_F(Q_CURRCNTR_ITERM) >= 0.0F || PARAM_SAME(Q_CURRCNTR_ITERM, D_CURRCNTR_ITERM), PARAM_NAMED(Q_CURRCNTR_ITERM) " must not be negative") \
     X(PARAM_F(KCURRA) * PARAM_F(KCURRB) >= 0.0F || PARAM_GIVEN(KCURR_SIGNS_DIFFER), \
       PARAM_NAMED(KCURRB) " must have the sign of " PARAM_NAMED(KCURRA) ": the amplifiers are alike; if BRINGUP found one inverted, add " \
       "#define KCURR_SIGNS_DIFFER")
@@ -194,9 +196,9 @@
 #define PARAM_RELATION_CURRENTS(X) \
     X(MAXIMUM_CURRENT_A < OVER_CURRENT_THRESHOLD_A, \
       PARAM_NAMED(MAXIMUM_CURRENT_A) " must be below " PARAM_NAMED(OVER_CURRENT_THRESHOLD_A)) \
-    X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
+    X(Q_CURRENT_REF_OPENLOOP <= MAXIMUM_CURRENT_A, PARAM_NAMED(Q_CURRENT_REF_OPENLOOP) " must not exceed " PARAM_NAMED(MAXIMUM_CURRENT_A)) \
     X(PARAM_F(I2T_CURRENT_A) <= PARAM_F(MAXIMUM_CURRENT_A), \
-      PARAM_NAMED(I2T_CURRENT_A) " must be at most " PARAM_NAMED(MAXIMUM_CURRENT_A) ": a larger one never trips; 0: no I2t") \
+      PARAM_NAMED(I2T_CURRENT_A) " must not exceed " PARAM_NAMED(MAXIMUM_CURRENT_A) ": a larger one never trips; 0: no I2t") \
     X(PARAM_F(SUPPLY_CURRENT_LIMIT_A) <= 0.0F || (PARAM_F(SUPPLY_CURRENT_LIMIT_A) >= 0.015625F * PARAM_F(MAXIMUM_CURRENT_A) \
                                                   && PARAM_F(SUPPLY_CURRENT_LIMIT_A) <= PARAM_F(MAXIMUM_CURRENT_A)), \
       PARAM_NAMED(SUPPLY_CURRENT_LIMIT_A) " must be 0, for no limit, or 1/64 to 1 of " PARAM_NAMED(MAXIMUM_CURRENT_A) ": the supply gives at most 0.87 of it") \
@@ -281,11 +283,10 @@
       "the low sides then conduct for 1 us before the sample") \
     X(PARAM_F(SAMPLE_WINDOW_SEC) + 0.000000001F >= PARAM_F(SAMPLE_DELAY_CLOCKS) * PWM_TICK_SEC, \
       PARAM_NAMED(SAMPLE_WINDOW_SEC) " must be at least the SAMPLE_DELAY_CLOCKS, 25 ns each: the low sides then still conduct at the sample") \
-    X(PARAM_F(D_CURRCNTR_PTERM) < 1.0F && PARAM_F(Q_CURRCNTR_PTERM) < 1.0F, \
-      "the current gain exceeds its Q format: lower " PARAM_NAMED(CURRENT_BANDWIDTH_HZ)) \
-    X(PARAM_F(D_CURRCNTR_ITERM) < 15.9F && PARAM_F(Q_CURRCNTR_ITERM) < 15.9F, \
-      "the current integral exceeds its Q format: lower " PARAM_NAMED(CURRENT_BANDWIDTH_HZ)) \
-    X(PARAM_F(SPEEDCNTR_PTERM) < 1.0F, "the speed gain exceeds its Q format: lower " PARAM_NAMED(SPEED_BANDWIDTH_HZ)) \
+    PARAM_RELATION_GAIN_FITS(X, 0, D_CURRCNTR_PTERM, 1, CURRENT_BANDWIDTH_HZ) PARAM_RELATION_GAIN_FITS(X, 0, D_CURRCNTR_ITERM, 15.9, CURRENT_BANDWIDTH_HZ) \
+    PARAM_RELATION_GAIN_FITS(X, PARAM_SAME(Q_CURRCNTR_PTERM, D_CURRCNTR_PTERM), Q_CURRCNTR_PTERM, 1, CURRENT_BANDWIDTH_HZ) \
+    PARAM_RELATION_GAIN_FITS(X, PARAM_SAME(Q_CURRCNTR_ITERM, D_CURRCNTR_ITERM), Q_CURRCNTR_ITERM, 15.9, CURRENT_BANDWIDTH_HZ) \
+    PARAM_RELATION_GAIN_FITS(X, 0, SPEEDCNTR_PTERM, 1, SPEED_BANDWIDTH_HZ) \
     X(PARAM_ACCEL < PARAM_F(PARAM_ACCEL_MOST) && PARAM_ACCEL >= PARAM_F(PARAM_ACCEL_LEAST), \
       PARAM_NAMED(MOTOR_INERTIA_KGM2) " does not fit the load observer's format (of a motor file, [mechanical] or [load] inertia): " \
       "check its unit") \
@@ -322,6 +323,8 @@
     X(PARAM_F(name) >= 0.1F || PARAM_F(name) <= -0.1F, \
       #name PARAM_IS(name) " must be 0.1 .. 0.6 or -0.6 .. -0.1: 0.5 is a gain of 1, and without one no current is measured")
 
+#define PARAM_RELATION_GAIN_FITS(X, unless, name, most, bandwidth) \
+    X((unless) || PARAM_F(name) < PARAM_F(most), #name " must be below " #most ", its Q format: lower it where a line defines it, else " #bandwidth PARAM_IS(bandwidth))
 #define PARAM_RELATION_HELD(X, name) \
     X(PARAM_F(name) * PARAM_F(NOPOLESPAIRS) >= PARAM_LOWEST_ERPM, \
       #name PARAM_IS(name) " must be at least 1126 * NOMINAL_BUS_V * DEADTIME_SEC / LOOPTIME_SEC / MOTOR_KPHI_V_PER_KRPM: raise it, " \

@@ -17,22 +17,22 @@ typedef struct {
 /* clang-format off */
 /** SLOT(number, first half, in states, second half, in states): functions of schedule.c; EVERY, RUNNING (the bridge switches) or CLOSED (closed loop). */
 #define SCHEDULE_TABLE(SLOT) \
-    SLOT( 0, observe_load,  RUNNING,   control_speed,    CLOSED) \
+    SLOT( 0, observe_load,  EVERY,     control_speed,    CLOSED) \
     SLOT( 1, step_state,    EVERY,     follow_bus,       EVERY) \
     SLOT( 2, limit_voltage, EVERY,     limit_currents,   CLOSED) \
     SLOT( 3, follow_speed,  CLOSED,    watch_signals,    CLOSED) \
-    SLOT( 4, observe_load,  RUNNING,   control_speed,    CLOSED) \
+    SLOT( 4, observe_load,  EVERY,     control_speed,    CLOSED) \
     SLOT( 5, ask_rotor,     EVERY,     follow_bus,       EVERY) \
     SLOT( 6, probe_rotor,   CLOSED,    choose_state,     CLOSED) \
-    SLOT( 7, trim_speed,    CLOSED,    follow_estimate,  RUNNING) \
-    SLOT( 8, observe_load,  RUNNING,   control_speed,    CLOSED) \
+    SLOT( 7, trim_speed,    CLOSED,    follow_estimate,  EVERY) \
+    SLOT( 8, observe_load,  EVERY,     control_speed,    CLOSED) \
     SLOT( 9, step_state,    EVERY,     follow_bus,       EVERY) \
     SLOT(10, limit_voltage, EVERY,     limit_and_learn,  RUNNING) \
     SLOT(11, follow_speed,  CLOSED,    watch_signals,    CLOSED) \
-    SLOT(12, observe_load,  RUNNING,   control_speed,    CLOSED) \
+    SLOT(12, observe_load,  EVERY,     control_speed,    CLOSED) \
     SLOT(13, ask_rotor,     EVERY,     follow_bus,       EVERY) \
-    SLOT(14, update_model,  RUNNING,   check_model,      CLOSED) \
-    SLOT(15, trim_speed,    CLOSED,    follow_estimate,  RUNNING)
+    SLOT(14, update_model,  EVERY,     check_model,      CLOSED) \
+    SLOT(15, trim_speed,    CLOSED,    follow_estimate,  EVERY)
 /* clang-format on */
 
 /** 1 in the periods that a call of the slow work follows. With the bridge off something follows each period. */

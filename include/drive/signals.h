@@ -40,7 +40,7 @@ typedef struct {
  *  the same angles of each turn. */
 void signals_check(drive_t *d, const drive_params_t *p);
 
-/** After a tenth of a second of it: the verdict. Evidence that a load can explain is halved. Slots 3 and 11 in closed loop. */
+/** After a tenth of a second of it, of fast turns also where it comes and goes: the verdict. Evidence that a load can explain is halved. Slots 3 and 11 in closed loop. */
 void signals_judge(drive_t *d, const drive_params_t *p);
 
 /* ---- the background's rule ---- */

@@ -120,7 +120,7 @@ void drive_raise(drive_t *d, drive_fault_t fault);
 /** The same in place: for handlers, which save no more than they use. */
 void drive_raise_at_once(drive_t *d, drive_fault_t fault);
 
-/** Forgets the fault. Control interrupt only. @return the next state: STOPPED, or the calibration that it has interrupted */
+/** Forgets the fault. The slow work only. @return the next state: STOPPED, or the calibration that it has interrupted */
 drive_state_t drive_clear_fault(drive_t *d);
 
 /** The direction of the run: of the target, or of the rotor that was caught. */

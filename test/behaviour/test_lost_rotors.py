@@ -9,7 +9,7 @@ from tools.bench.held_sweep import Case
 from tools.common import board_file, motor_file, paths
 from tuning import design, header
 
-TRINAMIC, IPM = "trinamic_qbl4208_41_04_006", "ipm_4pp_24v_2000"
+TRINAMIC, IPM, DMA0204 = "trinamic_qbl4208_41_04_006", "ipm_4pp_24v_2000", "hurst_dma0204024b101"
 
 
 def sweep(kind, module, name, folder):
@@ -38,3 +38,9 @@ def test_a_shaft_that_is_let_go_is_not_thrown_backwards(name, item, tmp_path):
     held = sweep(held_sweep.Held, held_sweep, name, tmp_path)
     row, = held.run([item], name)
     assert [outcome.got for outcome in held.check(item, row) if not outcome.ok] == [] and row["backwards_rpm"] <= held.most_back_rpm
+
+
+def test_a_brake_that_takes_300_rpm_a_millisecond_drives_no_current_over_its_limit(tmp_path):
+    held, item = sweep(held_sweep.Held, held_sweep, DMA0204, tmp_path), Case(2100.0, 0.0, 1.0, 0.08, 0.0, brake_nm=0.546)
+    row, = held.run([item], DMA0204)
+    assert row["fault"] is None and row["backwards_rpm"] == 0.0 and row["back_s"] < 0.2

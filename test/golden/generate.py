@@ -685,7 +685,7 @@ def hand_over(v, rng):
 @block("constants of Equations 5 to 8 for the motor of AN1292 with four current ranges (A * 100 in the name)",
        "c395: 3.95 A, c709: 7.09 A, c440: 4.4 A, c2200: 22 A; in the drive's formats")
 def params(v, _):
-    """What include/drive/param_scaling.h must give to 1 count, in float64."""
+    """What include/drive/scaling/ must give to 1 count, in float64."""
     for amperes in (3.95, 7.09, 4.4, 22.0):
         machine = ref.Machine(peak_current_a=amperes)
         v.constants |= {f"c{round(amperes * 100)}_{name}": value for name, value in machine.estimator().items()}

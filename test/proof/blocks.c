@@ -10,7 +10,7 @@
 #include "firmware/control/motor_model.c"
 #include "firmware/control/current_control.c"
 #include "firmware/control/estimator.c"
-#include "firmware/control/angle.c"
+#include "firmware/control/transforms.c"
 #include "firmware/control/observer.c"
 #include "firmware/control/svm.c"
 #include "firmware/drive/speed.c"

@@ -5,7 +5,7 @@
 
 #include "bounds.h"
 
-#include "firmware/control/angle.c"
+#include "firmware/control/transforms.c"
 
 static int16_t d_low, d_high; /* piece of the d controller's result under proof */
 static int16_t is_q;          /* the q controller comes next */

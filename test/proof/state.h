@@ -168,6 +168,7 @@ static void any_control(drive_control_t *c)
     c->ref_q13.d = any((int16_t)-current_max, current_max);
     c->ref_q13.q = any((int16_t)-current_max, current_max);
     c->iq_limit_q13 = any(0, current_max);
+    c->over_q13 = any(0, 16383);
     c->brake_limit_q13 = any(0, current_max);
     c->supply_q13 = any(0, current_max);
     c->i_q13.d = any(-IQ_MAX, IQ_MAX);
@@ -233,6 +234,7 @@ static void bounds_hold_again(void)
     //@ check reference: -32767 <= c->reference_erpm;
     //@ check ref: -current_max <= c->ref_q13.d <= current_max && -current_max <= c->ref_q13.q <= current_max;
     //@ check iq_limit: 0 <= c->iq_limit_q13 <= current_max;
+    //@ check over: 0 <= c->over_q13 <= 16383;
     //@ check brake_limit: 0 <= c->brake_limit_q13 <= current_max;
     //@ check supply: 0 <= c->supply_q13 <= current_max;
     //@ check align: 0 <= drive.run.align.mean_q14 && -32767 <= drive.run.align.least_q14 && -32767 <= drive.run.align.second_q14;

@@ -12,7 +12,7 @@
 #include "bounds.h"
 
 #include "firmware/control/current_control.c"
-#include "firmware/control/angle.c"
+#include "firmware/control/transforms.c"
 
 /*@ assigns \result \from sum, sum_max, inv_kfi;
     admit ensures speed: -32767 <= \result <= 32767; */ /* blocks.c, proof_omega: the last two are of one adaptation_apply(), or inv_kfi is 0 */
@@ -65,7 +65,6 @@ static void startup_ramp_turning(drive_t *d, const drive_params_t *p);
 #define startup_ramp_from_here startup_ramp_turning
 #include "firmware/drive/catch.c"
 #include "firmware/drive/drive.c"
-#include "firmware/drive/handover.c"
 #include "firmware/drive/held.c"
 #include "firmware/drive/model.c"
 #include "firmware/drive/modes/bringup.c"
@@ -278,7 +277,7 @@ static void any_state(uint16_t state)
     drive.run.fieldweak.trim_q13 = any((int16_t)-params.fieldweak.trim_max_q13, 0);
     any_observer_state(&drive.run.observer);
     any_adaptation(&drive.run.adaptation);
-    drive_update_model(&drive.run, &params, any(-32767, 32767));
+    drive_update_model(&drive.run, &params, any(-32767, 32767), any(-32767, 32767));
 }
 
 static drive_samples_t any_samples(void)

@@ -40,6 +40,8 @@ INCLUDES = ["-Itools/cpu_host", "-Iinclude", "-I."]
 # Text only, without code, for the compilers alone: cppcheck's preprocessor expands a parameter's name before ## and #, and clang-tidy takes a minute
 # for each configuration. clang takes eight seconds: these have every relation between them, as test_static.py sees.
 CHECKS_OF_PARAMETERS = ("firmware/drive/param_text.c", "firmware/drive/param_check.c")
+PARAMETERS = "include/drive/param_init.h"
+WHOLE = 4 # configurations of which cppcheck looks at the whole unit at once (of the first that is nearly so), for they use what the others do not
 CHECKED = [PRODUCT, ("IDENTIFY",), ("BRINGUP",)]
 
 
@@ -75,10 +77,10 @@ def read_deviations(page: Path) -> list[Deviation]:
     return deviations
 
 
-def run(command: list[str]) -> str:
+def run(command: list[str], **environment: str) -> str:
     """Standard output and error of the command; a tool that cannot run at all ends the program."""
     try:
-        done = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+        done = subprocess.run(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False, env=os.environ | environment)
     except OSError as error:
         print(f"foc33: {command[0]}, static checks: cannot be run ({error.strerror}); make static installs it", file=sys.stderr)
         sys.exit(2)
@@ -95,6 +97,7 @@ def each(function, items) -> list:
         return list(pool.map(function, items))
 
 
+@functools.cache
 def relative(path: str) -> str:
     return os.path.relpath(path)
 
@@ -146,14 +149,14 @@ def cover(texts: dict[tuple[str, ...], frozenset]) -> list[tuple[str, ...]]:
     return chosen
 
 
-def parts(name: str, texts: dict[tuple[str, ...], frozenset]) -> list[tuple[tuple[str, ...], str, frozenset]]:
+def parts(name: str, texts: dict[tuple[str, ...], frozenset], *without: str) -> list[tuple[tuple[str, ...], str, frozenset]]:
     """The configurations of cover(), each with a unit of the files that have in it lines which none before it had, of the first that is nearly every
-    file; and all lines of these files."""
+    file, without those that are named; and all lines of these files."""
     missing, found = frozenset().union(*texts.values()), []
     for number, configuration in enumerate(cover(texts)):
         files = {file for file, _, _ in texts[configuration] & missing}
         missing -= texts[configuration]
-        unit = as_unit(f"{name}_{number}.c", sorted(file for file in files if file.startswith(("firmware/", "include/"))))
+        unit = as_unit(f"{name}_{number}.c", sorted(file for file in files - set(without) if file.startswith(("firmware/", "include/"))))
         found.append((configuration, unit, frozenset(line for line in texts[configuration] if line[0] in files and (number == 0 or line[0] != "userparams.h"))))
     return found
 
@@ -186,8 +189,8 @@ def other_applications() -> list[str]:
 
 def cppcheck(unit: str, texts: dict[tuple[str, ...], frozenset], sources: list[str], deviations: list[Deviation]) -> list[Finding]:
     """Its own checks and those of its MISRA addon, with the target's type sizes: of each file, for some rules read its text only, what is delivered; of the
-    unit in configurations that have every line between them, of each the files with lines of its own, without the parameters' start values, which are most of
-    the text. While something then seems unused, the whole unit is looked at in one more of them."""
+    unit in configurations that have every line between them, without the parameters' start values, which are most of the text: of each the files with lines of
+    its own, but in some, and in more while something then seems unused, the whole unit."""
     sources = [source for source in sources if source not in CHECKS_OF_PARAMETERS]
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:
         Path(folder, "drive").mkdir()
@@ -196,14 +199,16 @@ def cppcheck(unit: str, texts: dict[tuple[str, ...], frozenset], sources: list[s
         def one(part: tuple[tuple[str, ...], str]) -> set[Finding]:
             return one_cppcheck(["-DANALYSED=1", f"-I{folder}", *defines(part[0])], [part[1]])
 
-        of = parts("cppcheck", texts)
-        found = [one_cppcheck(["--max-configs=1"], sources), *each(lambda part: one(part[:2]), of)]
-        lines = [texts[()], *(lines for _, _, lines in of)]
-        for configuration in cover(texts)[1:]:
+        of = parts("cppcheck", texts, PARAMETERS)
+        whole = [(configuration, unit, texts[configuration]) for configuration, _, _ in of]
+        runs = [of[0], *whole[1:WHOLE], *of[WHOLE:]]
+        found = each(lambda job: job(), [lambda: one_cppcheck(["--max-configs=1"], sources), *(functools.partial(one, run[:2]) for run in runs)])
+        lines = [texts[()], *(lines for _, _, lines in runs)]
+        for run in whole[WHOLE:]:
             if not any(finding.check in UNUSED and not any(row.covers(finding) for row in deviations) for finding in of_all(found, lines)):
                 break
-            found.append(one((configuration, unit)))
-            lines.append(texts[configuration])
+            found.append(one(run[:2]))
+            lines.append(run[2])
         found = of_all(found, lines)
     return sorted(found, key=lambda f: (f.check, f.file, f.line))
 
@@ -219,9 +224,11 @@ def of_all(found: list[set[Finding]], texts: list[frozenset]) -> set[Finding]:
 
 def one_cppcheck(options: list[str], sources: list[str]) -> set[Finding]:
     with TemporaryDirectory(prefix="cppcheck-", dir=BUILD) as folder:  # else it writes beside the sources
-        output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--platform={HERE}/dspic33f.xml",
+        Path(folder, "sitecustomize.py").write_text("import gc\ngc.disable()\n") # the addon makes objects and ends
+        output = run([os.environ.get("CPPCHECK", "cppcheck"), "--quiet", "--std=c99", f"--addon-python={sys.executable}", f"--platform={HERE}/dspic33f.xml",
                       f"--cppcheck-build-dir={folder}", f"-j{os.cpu_count()}", "--template={file}:{line}:{id}:{message}", "--inconclusive",
-                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", *options, *INCLUDES, *sources])
+                      "--enable=warning,style,performance,portability,unusedFunction", "--addon=misra", *options, *INCLUDES, *sources],
+                     PYTHONPATH=folder)
     return {Finding(f"cppcheck {check}".replace("cppcheck misra-c2012-", "misra "), relative(file), int(number), text)
             for file, number, check, text in re.findall(r"^(?!tools/)([^:\n]+):(\d+):([\w.-]+):(.*)$", output, re.M)}
 

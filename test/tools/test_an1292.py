@@ -107,6 +107,8 @@ def test_the_later_version_divides_r_by_16_and_says_so(parms):
     assert found.rs_ohm == pytest.approx(1.1, rel=1e-3) and "2022" in found.notes[0]
     assert parms(LATER, NORM_RS=2).rs_ohm == pytest.approx(1.1 / 8.0, rel=1e-3)
     assert parms(changed(("#define NORM_RS 7991", "#define NORM_RS_SCALE 3\n#define NORM_RS 1998"))).rs_ohm == pytest.approx(1.1, rel=1e-3)
+    shift = changed(("#define NORM_RS 7991", "#define NORM_RS 7991\n#define NORM_RS_SCALE_SHIFT 11"))
+    assert any("NORM_RS_SCALE_SHIFT is not read; NORM_RS is taken as divided by 2: if yours is not, rs_divisor= in SET" in note for note in parms(shift).notes)
 
 
 def test_the_period_may_follow_from_deltat(parms):

@@ -12,7 +12,7 @@ HOOKS = "void app_init(void);\nvoid app_ms(void);\nvoid app_init(void) {}\nvoid 
 def compiled(folder, text: str | None, name: str = "mine.c"):
     if text is not None:
         (folder / name).write_text(text)
-    command = [paths.ROOT / "tools" / "make" / "app.sh", "app.o", name, "shown.c", "nm", "gcc", f"-I{paths.ROOT}/include", "-MMD", "-MP"]
+    command = [paths.ROOT / "tools" / "make" / "app.sh", "app.o", name, "shown.c", "nm", "gcc", "-Wall", f"-I{paths.ROOT}/include", "-MMD", "-MP"]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
 
 
@@ -40,4 +40,10 @@ def test_an_application_in_utf_16_is_called_so(tmp_path, encoding):
 def test_an_application_that_reaches_into_the_drive_is_refused_in_one_line_and_leaves_no_object(tmp_path, text, says):
     done = compiled(tmp_path, text)
     assert done.returncode == 2 and done.stderr.startswith(f"foc33: {says}") and done.stderr.count("\n") == 1
+    assert not (tmp_path / "app.o").exists()
+
+
+def test_a_warning_stops_the_build_on_the_pc_as_it_does_for_the_chip(tmp_path):
+    done = compiled(tmp_path, HOOKS.replace("app_init(void) {}", "app_init(void) { int idle; }"))
+    assert done.returncode != 0 and "mine.c:3:" in done.stderr and "error: unused variable" in done.stderr
     assert not (tmp_path / "app.o").exists()

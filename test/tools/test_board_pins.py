@@ -69,7 +69,7 @@ def test_a_pin_may_be_told_by_any_of_its_names_and_what_differs_is_a_line_of_mcl
     found = load('fault = "RP9"\ncurrent_a = "AN3"\ncurrent_b = "RB2"\nbus = "AN5"\nuart_tx = "RC5"\ns2 = "RA8"\npwm_a = "PWM1H1"').pins
     assert found == {"fault": "RB9", "current_a": "RB1", "current_b": "RB2", "bus": "RB3", "uart_tx": "RC5", "s2": "RA8", "pwm_a": "RB14"}
     assert pins.differences(found) == ["#define BOARD_PIN_FAULT B, 9", "#define BOARD_PIN_CURRENT_A B, 1", "#define BOARD_PIN_CURRENT_B B, 2",
-                                       "#define BOARD_PIN_BUS B, 3", "#define BOARD_PIN_UART_TX C, 5"]
+                                       "#define BOARD_PIN_BUS B, 3", "#define BOARD_PIN_UART_TX C, 5", "#define BOARD_OTHER_TX C, 3"]
 
 
 @pytest.mark.parametrize("line, parts", [
@@ -101,10 +101,11 @@ def built(folder, *changes: tuple[str, str], holds: str = "1", defines: tuple[st
 
 
 @pytest.mark.parametrize("changes, named", [
-    ((("BOARD_PIN_FAULT", "B, 9"), ("BOARD_PIN_POT", "C, 0"), ("BOARD_PIN_LED_RUN", "A, 4"), ("BOARD_PIN_UART_TX", "C, 5")), ""),
+    ((("BOARD_PIN_FAULT", "B, 9"), ("BOARD_PIN_POT", "C, 0"), ("BOARD_PIN_LED_RUN", "A, 4"), ("BOARD_PIN_UART_TX", "C, 5"), ("BOARD_OTHER_TX", "C, 3")), ""),
     ((("BOARD_PIN_CURRENT_A", "B, 1"), ("BOARD_PIN_CURRENT_B", "B, 2"), ("BOARD_PIN_BUS", "B, 3")), ""),
     ((("BOARD_PIN_FAULT", "A, 8"),), "fault_input_has_an_RP_number"), ((("BOARD_PIN_UART_RX", "A, 9"),), "serial_line_has_RP_numbers"),
-    ((("BOARD_PIN_POT", "B, 8"),), "potentiometer_has_an_AN_number"), ((("BOARD_PIN_BUS", "B, 1"),), "currents_and_bus_are_AN0_to_2_or_AN3_to_5"),
+    ((("BOARD_PIN_POT", "B, 8"),), "potentiometer_and_NTCs_have_AN_numbers"), ((("BOARD_PIN_BUS", "B, 1"),), "currents_and_bus_are_AN0_to_2_or_AN3_to_5"),
+    ((("BOARD_PIN_UART_TX", "C, 5"),), "BOARD_OTHER_TX_is_another_pin"), ((("BOARD_OTHER_TX", "A, 9"),), "BOARD_OTHER_TX_is_another_pin"),
     ((("BOARD_PIN_FAULT", "D, 1"),), "PIN_D1_RP")])
 def test_firmware_for_other_pins_builds_and_what_the_chip_cannot_do_fails_by_name(tmp_path, changes, named):
     error = built(tmp_path, *changes)

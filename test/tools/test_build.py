@@ -8,7 +8,7 @@ import pytest
 from support import refusal
 from xc16 import make
 
-from tools.bench import build
+from tools.bench import build, report
 from tools.common import paths
 
 TUNED = paths.TUNED / "some_motor"
@@ -82,3 +82,19 @@ REFUSED = "include/x.h:3: error: static assertion failed: \"userparams.h: MOTOR_
     ("echo 'noise' >&2; echo 'a.c:3:1: error: expected ;' >&2; exit 2", None, "does not build, make vboard: a.c:3:1: error: expected ;")])
 def test_a_refused_parameter_or_another_error_is_told_with_its_place(fake, script, userparams, text):
     assert refusal(lambda: fake(script, userparams=userparams)).endswith(text)
+
+
+# ---- application ---------------------------------------------------------------------------------------------------------
+def test_an_application_that_is_no_file_is_called_what_it_is(tmp_path):
+    (tmp_path / "pump.c").touch()
+    for text, what, remedy in ((f"{tmp_path}", "' is a folder", "name the C file in it"), (f"{tmp_path}/pump", "no file '", f"did you mean '{tmp_path}/pump.c'?"),
+                               (f"{tmp_path}/fan.c", f"no file '{tmp_path}/fan.c'", "name a C file, or one of analog, fan, "), ("mine.c", "no file 'mine.c'", "name a C file"),
+                               ("panle", "no application 'panle'", "did you mean 'panel'?")):
+        refusal(lambda text=text: build.app(text, "APP"), what, "APP: ", remedy)
+    assert build.app("pump.c", "APP", tmp_path / "scenario.toml") == f"APP={tmp_path}/pump.c" and build.app("fan", "APP") == "APP=fan"
+
+
+def test_a_report_names_the_application_that_ran():
+    for defines, shown in (([], ""), (["TUNING", "APP=fan"], "fan"), ([f"APP={paths.ROOT}/examples/my_app.c"], "examples/my_app.c")):
+        data = {"motor": "m.toml", "motor_title": "M", "header": "userparams.h", "note": "", "app": build.app_shown(defines)}
+        assert report.used_lines(data) == ["motor   m.toml: M", "header  userparams.h", *([f"app     {shown}"] if shown else [])]

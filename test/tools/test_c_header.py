@@ -52,8 +52,13 @@ def test_a_current_is_a_share_of_full_scale(header):
 def test_macros_are_replaced_as_text_with_and_without_arguments(header):
     found = header("#define RATE 20000\n#define PERIOD (1.0/RATE)\n#define SUM(a, b) a + b\n#define A 2*SUM(3, RATE)\n#define B PERIOD\n#define C SELF\n#define SELF SELF\n")
     assert found.value("A") == 2 * 3 + 20000 and found.value("B") == pytest.approx(50e-6)
-    with pytest.raises(UserError, match="SELF is not defined"):
+    with pytest.raises(UserError, match="C: SELF in line 7 leads back to itself, .*:6: write its number there"):
         found.value("C")
+
+
+def test_macros_that_need_each_other_are_called_so(header):
+    with pytest.raises(UserError, match="A: B in line 2 leads back to itself, .*:1: write its number there"):
+        header("#define A B\n#define B A\n").value("A")
 
 
 @pytest.mark.parametrize("body, told", [

@@ -62,6 +62,7 @@ def test_the_voltage_model_is_the_equation_and_its_circle_the_modulator_s():
     w = 4000.0 * 5.0 * 2.0 * math.pi / 60.0
     v_d, v_q = 2.67 * -1.5 - w * 1.92e-3 * 0.4, 2.67 * 0.4 + w * (1.92e-3 * -1.5 + 7.983e-3)
     assert model_use(PARAMS, 4000.0, -1.5, 0.4) * voltage_limit(PARAMS) == approx(math.hypot(v_d, v_q), abs=5e-3)
+    assert model_use(PARAMS | {"MOTOR_RS_OHM": 2.0, "BRIDGE_RS_OHM": 0.67}, 4000.0, -1.5, 0.4) == approx(model_use(PARAMS, 4000.0, -1.5, 0.4), abs=1e-9)
     current = model_current(PARAMS, 4000.0, 0.3, 0.97, 3.0)
     assert model_use(PARAMS, 4000.0, -current, 0.3) <= 0.97 < model_use(PARAMS, 4000.0, -current + 0.01, 0.3)
 
@@ -392,7 +393,8 @@ def test_numbers_are_read_and_the_highest_speed_is_where_the_format_of_speeds_or
     text = "#define A 1.5 /* x */\n  # define B 0xF\n#define C (-2)\n#define D OTHER\n/* #define E 3 */\n"
     assert fw_tune.defines(text) == {"A": 1.5, "B": 15.0, "C": -2.0}
     assert fw_tune.highest_speed(KNOWN) == 6400.0
-    assert fw_tune.highest_speed({**KNOWN, "OVER_CURRENT_THRESHOLD_A": 3.81, "MOTOR_LS_MH": 2.2}) < 6400.0
+    less = {**KNOWN, "OVER_CURRENT_THRESHOLD_A": 3.81, "MOTOR_LS_MH": 2.2}
+    assert fw_tune.highest_speed({**less, "MOTOR_RS_OHM": KNOWN["MOTOR_RS_OHM"] - 1.0, "BRIDGE_RS_OHM": 1.0}) == fw_tune.highest_speed(less) < 6400.0
 
 
 def test_a_header_s_own_table_is_interpolated_as_the_firmware_does():

@@ -5,6 +5,8 @@ import pytest
 from tools.live import endurance
 from tools.live.endurance import Found, Row, failures
 
+pytestmark = pytest.mark.waits
+
 
 def rows(server: float = 0.1, grown_mb: float = 0.0, tab_mb: float = 0.0, frames: float = 20.0) -> list[Row]:
     """Of ten minutes of two tabs, the second of which is the slower one; what grows does so until the end."""

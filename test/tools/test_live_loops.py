@@ -23,6 +23,8 @@ from tools.live.step_response import NO_BRAKE
 from tools.live.symbols import Symbols
 from tools.live.virtual_board import VirtualBoard
 
+pytestmark = pytest.mark.waits
+
 LOAD_SHARE = 0.4
 """Of the rated torque: the current is clear of what dead time loses."""
 LEFT = known().find(f"{response.SINE}.left")
@@ -139,9 +141,9 @@ def test_the_current_loop_in_closed_loop_is_told_to_be_less_than_it_is(living):
 
 
 @pytest.mark.parametrize("name, size, caption, peak", [
-    ("current", 5, "0.138 A", 0.15), ("speed", 10, "14", 0.05), ("load", 40, "32 mN·m", None)])
+    ("current", 10, "0.275 A", 0.15), ("speed", 10, "14", 0.05), ("load", 40, "32 mN·m", None)])
 def test_a_step_of_the_running_motor_is_as_the_model_says_and_nobody_has_lost_the_command(living, monkeypatch, name, size, caption, peak):
-    records = 4 if name == "load" else 2 # one that meets the ripple's lowest place dips deeper
+    records = 2 if name == "speed" else 4 # the mean of two is a tenth off by the current's noise, or dips as much deeper where one meets the ripple
     monkeypatch.setattr(step, "RECORDS", records)
     living.turning()
     time.sleep(0.3)

@@ -11,6 +11,8 @@ from support import document
 from tools.bench import scenario_file
 from tools.common import paths
 
+pytestmark = pytest.mark.waits
+
 HOME, END, ARROW_DOWN = "\ue011", "\ue010", "\ue015"
 SIZES = [SIZE, (1000, 700)]
 

@@ -18,6 +18,8 @@ from tools.live.lnet import connect
 from tools.live.real_board import LEASE_MS, RealBoard
 from tools.live.watch import WATCHED, Watch, blocks
 
+pytestmark = pytest.mark.waits
+
 SYMBOLS = known()
 
 

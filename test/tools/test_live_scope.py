@@ -20,6 +20,8 @@ from tools.live.scope import FAULT, STATE, Scope
 from tools.live.symbols import Symbols
 from tools.live.virtual_board import VirtualBoard
 
+pytestmark = pytest.mark.waits
+
 SYMBOLS = known()
 KNOWN = SYMBOLS.variables
 WISH = {"channels": [], "trigger": None, "level": 0.0, "rising": True, "position": 0.25, "factor": 2, "mode": "single"}

@@ -101,6 +101,12 @@ def test_each_command_of_the_client_says_its_lines(monkeypatch, capsys, argument
     assert spoken == said and (out == "NONE\n" if arguments == ["fault"] else shown in out)
 
 
+def test_a_drive_that_was_told_to_stop_and_still_turns_is_said_to_stop(monkeypatch, capsys):
+    monkeypatch.setattr(text.lnet, "open_port", lambda port: Answers(answer("ok run 1 speed 1498 fault NONE")))
+    assert text.main(["/dev/ttyUSB0", "stop"]) == 0
+    assert capsys.readouterr().out == "stops, 1498 rpm, fault NONE\n"
+
+
 def test_a_port_that_goes_away_is_told_in_one_line(monkeypatch, capsys):
     class Gone(Answers):
         def write(self, data):
@@ -110,9 +116,14 @@ def test_a_port_that_goes_away_is_told_in_one_line(monkeypatch, capsys):
     assert "the port is gone" in capsys.readouterr().err
 
 
-def test_a_speed_without_a_number_is_refused_in_one_line(capsys):
-    assert text.main(["/dev/null", "speed"]) == 2
-    assert "speed needs a number: speed 1500" in capsys.readouterr().err
+@pytest.mark.parametrize("words, told", [
+    (["speed"], "speed needs a number: speed 1500"), (["stop", "1500"], "stop takes no number: leave out 1500"),
+    (["run", "-99999"], "-99999 rpm is no speed of the drive: choose a speed between MINIMUM_SPEED_RPM and")])
+def test_what_the_drive_would_not_understand_is_refused_in_one_line_and_nothing_is_said(monkeypatch, capsys, words, told):
+    monkeypatch.setattr(text.lnet, "open_port", lambda port: pytest.fail("the port was opened"))
+    assert text.main(["/dev/null", *words]) == 2
+    error = capsys.readouterr().err
+    assert told in error and error.count("\n") == 1
 
 
 def test_the_page_shows_the_example_and_lines_with_right_checksums():

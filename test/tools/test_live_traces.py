@@ -10,6 +10,8 @@ from live_support import recorder_parts, served, until
 
 from tools.common import drive_tables
 
+pytestmark = pytest.mark.waits
+
 HOME, END, RIGHT, TAB = "\ue011", "\ue010", "\ue014", "\ue004"
 ALL = "\ue009a\ue000"
 """Ctrl-A."""

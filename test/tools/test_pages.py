@@ -57,6 +57,15 @@ def test_every_link_leads_somewhere():
                 assert not anchor or anchor in anchors(path.read_text(encoding="utf-8")), (page, target)
 
 
+def test_from_the_readme_links_lead_to_every_page():
+    known, found = pages(), {"README.md"}
+    while new := {str(path) for page in found for target in re.findall(r"\]\(([^)\s#]+)", known[page])
+                  if (path := (ROOT / page).parent.joinpath(target).resolve()).suffix == ".md" and path.is_relative_to(ROOT)
+                  and (path := path.relative_to(ROOT)) and str(path) not in found}:
+        found |= new
+    assert set(known) - found == set()
+
+
 def test_every_name_is_in_the_file_beside_it():
     rows = re.findall(r"^\| ([^|]*) \| ([^|]*`include/[^|]*|[^|]*`firmware/[^|]*) \| ([^|]*) \|$", pages()["docs/architecture.md"], re.MULTILINE)
     for _, file, name in rows:
@@ -65,7 +74,7 @@ def test_every_name_is_in_the_file_beside_it():
 
 
 def test_the_newest_version_is_the_headers():
-    version = re.search(r'FOC33_VERSION "(\d+\.\d+\.\d+)"', (ROOT / "include/version.h").read_text(encoding="utf-8"))[1]
+    version = re.search(r'FOC33_VERSION "(\d+\.\d+\.\d+)"', (ROOT / "include/board/status.h").read_text(encoding="utf-8"))[1]
     newest = re.search(r"^## \[(\d\S*)\] - \d{4}-\d\d-\d\d$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)[1]
     told = {number for page, text in pages().items() if page != "CHANGELOG.md" for number in re.findall(r"foc33 (\d+\.\d+\.\d+)", text)}
     assert version == newest and told <= {version}

@@ -72,6 +72,8 @@ def test_what_cannot_be_measured_is_told_in_one_line(tmp_path, arguments, says):
 
 
 PLANT = loops.Plant(0.5, 1e-3, 1e-3, 0.01, 4, 1e-5)
+IPM = {"NOPOLESPAIRS": 4.0, "MOTOR_LS_MH": 2.2, "MOTOR_SALIENCY_UH": 1100.0, "MOTOR_KPHI_V_PER_KRPM": 7.255, "MOTOR_RS_OHM": 0.8, "MOTOR_INERTIA_KGM2": 1.6e-5,
+       "COUNT_SPEED_RPM": 0.25, "COUNT_CURRENT_A": 5e-4, "COUNT_VOLTAGE_V": 8e-4, "CURRENT_KP_D": 6.9, "CURRENT_KP_Q": 13.8, "CURRENT_KI": 0.25}
 GAINS = loops.Gains(6.0, 6.0, 0.16, 0.0, 0.0, 0.06, 5e-5)
 
 
@@ -85,12 +87,15 @@ def test_q_axis_loop_is_what_both_axes_together_leave_of_it():
         assert response_model.of_q_current(np.array([hz]), PLANT, GAINS, omega_e)[0] == pytest.approx(closed / (1.0 - closed), rel=1e-9)
 
 
+def test_the_bridge_s_resistance_counts_in_both_models():
+    motor, params = motor_file.load("ipm_4pp_24v_2000"), IPM | {"MOTOR_RS_OHM": 0.5, "BRIDGE_RS_OHM": 0.3}
+    assert [plant.rs for plant in response_model.plants(params, motor)] == pytest.approx([motor.rs_ohm + 0.3, 0.8])
+
+
 @pytest.mark.parametrize(("state", "inductance"), [("CLOSED", "lq_h"), ("RAMP", "ld_h")])
 def test_along_the_forced_current_lies_the_inductance_of_the_d_axis(state, inductance):
     motor = motor_file.load("ipm_4pp_24v_2000")
-    params = {"NOPOLESPAIRS": 4.0, "MOTOR_LS_MH": 2.2, "MOTOR_SALIENCY_UH": 1100.0, "MOTOR_KPHI_V_PER_KRPM": 7.255, "MOTOR_RS_OHM": 0.8, "MOTOR_INERTIA_KGM2": 1.6e-5,
-              "COUNT_SPEED_RPM": 0.25, "COUNT_CURRENT_A": 5e-4, "COUNT_VOLTAGE_V": 8e-4, "CURRENT_KP_D": 6.9, "CURRENT_KP_Q": 13.8, "CURRENT_KI": 0.25}
-    bench = mock.Mock(params=params, period_s=5e-5)
+    bench = mock.Mock(params=IPM, period_s=5e-5)
     bench.firmware.symbols.variables, bench.firmware.get.return_value = {}, 1000
     bench.state.return_value, bench.speed_rpm.return_value = state, 500.0
     hz = 1000.0 # the winding is all inductance, and a period is short

@@ -34,6 +34,7 @@ CASES: dict[str, tuple[str, dict[Place, Any]]] = {
                               for rows in spreadsheet.DATA.values() for x in rows}
             | {("Parameters", name): 15 if text == "0xF" else text if text.startswith("NORM") else float(text)
                for name, text in of(HURST).params.items() if name not in spreadsheet.FORMULAS}),
+    "bridge": (HURST, {("Parameters", "MOTOR_RS_OHM"): 2.0, ("Parameters", "BRIDGE_RS_OHM"): 0.67}),
     **{f"{amperes} A": (HURST, {("Motor", "Ipeak"): amperes} | ({("Constants", "NORM_RS"): 4} if amperes > 10 else {})) for amperes in PUBLISHED}}
 
 
@@ -180,6 +181,12 @@ def test_a_motor_of_ones_own_needs_its_numbers_and_then_gets_the_same_lines():
 
 def test_a_comma_as_decimal_sign_changes_no_line():
     assert recalculate({"comma": (HURST, {})}, COMMA)["comma"].lines == recalculated()[HURST].lines
+
+
+def test_the_bridge_s_resistance_is_a_line_of_its_own_and_counts_beside_the_winding():
+    found, usual = recalculated()["bridge"], recalculated()[HURST]
+    assert found.sheets["Constants"] == usual.sheets["Constants"] and found.red() == 0
+    assert {name: text for name, text in found.params.items() if text != usual.params.get(name)} == {"MOTOR_RS_OHM": "2", "BRIDGE_RS_OHM": "0.67"}
 
 
 @pytest.mark.parametrize("amperes, wanted", PUBLISHED.items())

@@ -107,6 +107,23 @@ def test_at_the_time_limit_a_suite_ends_with_all_that_it_has_started(tmp_path):
     assert not (tmp_path / "left").exists()
 
 
+def test_one_suite_that_waits_runs_beside_those_that_work(tmp_path):
+    (tmp_path / "test/unit").mkdir(parents=True)
+    (tmp_path / "test/pytest.ini").write_text("[pytest]\nmarkers = waits\n")
+    spans = "import time, pathlib\ndef test_a():\n    begin = time.monotonic()\n    time.sleep(0.5)\n    pathlib.Path('{}').write_text(f'{{begin}} {{time.monotonic()}}')\n"
+    for name in ("a_waits", "b_waits", "c_works", "d_works", "e_works"):
+        mark = "import pytest\npytestmark = pytest.mark.waits\n" if "waits" in name else ""
+        (tmp_path / f"test/unit/test_{name}.py").write_text(mark + spans.format(name))
+    code, output = run(tmp_path)
+    assert (code, output.splitlines()[-1]) == (0, "5 passed, 0 failed"), output
+    span = {name: [float(part) for part in (tmp_path / name).read_text().split()] for name in ("a_waits", "b_waits", "c_works", "d_works", "e_works")}
+
+    def together(one: str, other: str) -> bool:
+        return span[one][0] < span[other][1] and span[other][0] < span[one][1]
+    assert together("a_waits", "c_works") and together("a_waits", "d_works") and together("c_works", "d_works")
+    assert not together("a_waits", "b_waits") and not (together("c_works", "e_works") and together("d_works", "e_works"))
+
+
 def test_while_no_suite_ends_it_says_which_ones_run(tmp_path):
     (tmp_path / "test/unit").mkdir(parents=True)
     (tmp_path / "test/pytest.ini").write_text("[pytest]\n")

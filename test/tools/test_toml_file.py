@@ -20,7 +20,11 @@ def close(root) -> None:
 
 # Text of the file, what is asked of it, and what the refusal must say.
 REFUSED = [
-    ("a = 1\nb = = 2\n", None, "TOML syntax", "line 2"), ("a = 1\na = 2\n", None, "TOML syntax", "line 2"),
+    ("a = 1\nb = = 2\n", None, "TOML syntax", "line 2"),
+    ("a = 1\na = 2\n", None, "TOML syntax", "line 2: a stands twice in its table: remove one of the two"),
+    ("a = 1\nr = { value = 1,5, unit = \"ohm\" }\n", None, "TOML syntax", "line 2: write 1.5, with a decimal point"),
+    ("a = -2,67", None, "TOML syntax", "line 1: write -2.67"),
+    ("a = [1,5]\nb\n", None, "TOML syntax", "line 2: expected"),
     ("[a.b]\nx = 1\n[a.b]\n", None, "cannot declare [a.b] twice", "line 3"),
     ("[a]\nx = 1\n[a]\n", None, "cannot declare [a] twice", "line 3"),
     ("a = 1\nb = \"x", None, "TOML syntax", "line 2"),

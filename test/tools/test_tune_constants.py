@@ -102,7 +102,7 @@ def test_engineering_values_are_the_parameters():
     ("KFILTER_ESDQ", "9", "^KFILTER_ESDQ = 9 is outside 10 .. 8000 Q15$"),
     ("SNAPDELAY", "32001", "^SNAPDELAY = 32001 is outside 1 .. 32000 periods$"),
     ("MAXIMUM_SPEED_RPM", "15001", "at most 75000"), ("IDREF_SPEED7", "-3", "IDREF_SPEED7 = -3 must not exceed"),
-    ("OVER_CURRENT_THRESHOLD_A", "3.9", "86.5 %"), ("D_CURRCNTR_CTERM", "0.5", "D_CURRCNTR_CTERM must be")])
+    ("OVER_CURRENT_THRESHOLD_A", "3.9", "86.5 %"), ("D_CURRCNTR_CTERM", "0.5", "^D_CURRCNTR_CTERM = 0.5 must be 0.9 ")])
 def test_a_value_outside_its_range_and_a_broken_relation_are_told_in_the_build_s_words(name, value, words):
     messages = constants.header(of(HURST).params | {name: value}).wrong
     assert any(re.search(words, message) for message in messages), messages

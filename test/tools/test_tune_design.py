@@ -238,6 +238,12 @@ def test_what_works_with_a_cost_is_warned_about(motor, says):
     assert any(all(words in f"{warning}$" for words in says) for warning in warnings), warnings
 
 
+def test_two_warnings_that_ask_for_a_higher_minimum_speed_name_one_number():
+    name = "light rotor that a brake stops at once"
+    named = [re.findall(r"set MINIMUM_SPEED_RPM to ([\d.]+) in", warning) for warning in made(**WARNED[name][0]).warnings]
+    assert sum(named, []) == ["230", "230"]
+
+
 def test_the_supply_s_resistance_and_the_rated_speed_that_the_warning_names_are_enough():
     words = next(warning for warning in made(board=with_supply(8.0), rated_torque_nm=0.07).warnings if "ohm of the supply" in warning)
     ohm, rpm = (float(re.search(f"{what} to ([0-9.]+)", words)[1]) for what in ("resistance", "rated speed"))
@@ -283,6 +289,7 @@ def test_an_unstable_loop_is_called_so_and_has_no_margins():
     warning = next(line for line in d.warnings if "LOAD_BANDWIDTH_HZ = 148" in line)
     assert "the speed loop is unstable at worst (" in warning and "speed loop unstable at worst" in report.brief(d)
     assert "current loop    1000 Hz, phase margin" in report.text(d)
+    assert re.search(r"current loop    1000 Hz, .* at worst \(.*; 60 are asked there\), gain margin", report.text(d))
     assert re.search(r"speed loop      21.9 Hz, .*unstable at worst \(", report.text(d))
     for text in (warning, report.text(d), report.brief(d), header.write(d)):
         assert not re.search(r"-\d+(\.\d)? degrees|-\d+(\.\d)? (at worst|over the parameter set)", text)

@@ -138,4 +138,6 @@ def test_every_assumption_of_the_simulator_and_every_relation_has_a_row():
     rows = param_rows.TABLE.read_text(encoding="utf-8").partition("#define PARAM_RELATION_ALONE")[2]
     rows = rows.partition("#define PARAM_INVKFI_FITS")[0]
     for_each_sensor = rows.partition("#define PARAM_RELATION_HEAT")[2].partition("#define PARAM_RELATION_REST")[0].count("    X(")
-    assert for_each_sensor == 3 and tables.params().count("\n- ") == rows.count("    X(") + for_each_sensor + 5
+    for_each_gain = rows.count("PARAM_RELATION_GAIN_FITS(X, ")
+    assert for_each_sensor == 3 and for_each_gain == 5
+    assert tables.params().count("\n- ") == rows.count("    X(") + for_each_sensor + for_each_gain + 5

@@ -9,7 +9,7 @@ from pytest import approx
 from support import MOTORS
 from tune_support import HURST, NO_FRICTION, SMALL_MOTOR, designed, of
 
-from tools.common import board_file, motor_file, param_rows, paths
+from tools.common import board_file, motor_file, paths
 from tuning import start
 
 BOARD, MOTOR = board_file.load("mclv"), motor_file.load(HURST)
@@ -59,8 +59,6 @@ def test_numbers_of_the_rules():
     s = of(HURST).start_up
     assert s.acceleration_rpm_s == approx(10 / 1024 / 65536 / 50e-6 ** 2 * 60 / 5, abs=1e-6)
     assert s.ramp_s == approx(1000 / s.acceleration_rpm_s, abs=1e-9)
-    # the sample's delay is the header's
-    assert param_rows.number("SAMPLE_DELAY_CLOCKS") / 40e6 == approx(start.SAMPLE_AFTER_MEAN_S, abs=5e-8)
 
 
 def test_more_inertia_means_a_longer_lock_and_a_slower_ramp():

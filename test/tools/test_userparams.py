@@ -86,7 +86,7 @@ MISTAKES = {
     "a gain that is no number": (HEADER.replace(RS, RS + "#define SPEEDCNTR_PTERM 0,1\n"), "SPEEDCNTR_PTERM",
                                  "SPEEDCNTR_PTERM = 0,1 is no number: remove the line, or write a number"),
     **{f"a bridge of {text}": (HEADER.replace(RS, RS + f"#define BRIDGE_RS_OHM {text}\n"), "BRIDGE_RS_OHM", f"BRIDGE_RS_OHM {says}") for text, says in (
-        ("abc", "= abc is no number: remove the line, or write a number"), ("1;", "= 1; ends in a semicolon: write 1"), ("-1", "must be 0 .. 1 ohm"))},
+        ("abc", "= abc is no number: remove the line, or write a number"), ("1;", "= 1; ends in a semicolon: write 1"), ("-1", "= -1 must be 0 .. 1 ohm"))},
     "nothing": (value("MOTOR_RS_OHM", ""), "MOTOR_RS_OHM", f"MOTOR_RS_OHM has no value: write a number, {range_of('MOTOR_RS_OHM')}"),
     **{f"removed {name}": (HEADER.replace(line_of(name), ""), "",
                            f"{name} is missing: add #define {name} and a number, {range_of(name)}, or make tune")
@@ -189,6 +189,45 @@ def test_mistakes_of_all_kinds_are_told_in_one_build(tmp_path):
         assert line.startswith(f"foc33: {place(text, name) if WRONG.get(name, 1) else 'userparams.h'}: {name} "), line
 
 
+def lines_of(tmp_path: Path, **wrong: str) -> dict[str, str]:
+    """Of a header with these values: what the build says, by each line's first word."""
+    text = HEADER
+    for name, number in wrong.items():
+        text = text.replace(line_of(name), f"#define {name} {number}\n") if name in parameters() else text.replace(RS, f"{RS}#define {name} {number}\n")
+    code, lines = checked(tmp_path, PC, text)
+    assert code == 2 and all(line.startswith(f"foc33: {place(text, line.split(': ')[2].split()[0])}: ") for line in lines), lines
+    return {line.split(": ", 2)[2].split()[0]: line.split(": ", 2)[2] for line in lines}
+
+
+def test_values_that_do_not_fit_each_other_are_all_told_in_one_build(tmp_path):
+    told = lines_of(tmp_path, SPEED_BANDWIDTH_HZ="50", MOTOR_INERTIA_KGM2="0.00000001", OVER_VOLTAGE_V="47", END_SPEED_RPM="4000", KCURRB="0.5", I2T_CURRENT_A="5",
+                    SAMPLE_WINDOW_SEC="0.0000012", D_CURRCNTR_PTERM="2")
+    assert set(told) == {"SPEED_BANDWIDTH_HZ", "MOTOR_INERTIA_KGM2", "OVER_VOLTAGE_V", "END_SPEED_RPM", "KCURRB", "I2T_CURRENT_A", "SAMPLE_WINDOW_SEC", "D_CURRCNTR_PTERM"}
+
+
+def test_several_values_that_exceed_one_are_one_line_and_so_is_the_one_that_several_exceed(tmp_path):
+    assert lines_of(tmp_path, Q_CURRENT_REF_OPENLOOP="3", I2T_CURRENT_A="3.5", IDREF_SPEED5="-3.2") == {
+        "Q_CURRENT_REF_OPENLOOP": "Q_CURRENT_REF_OPENLOOP = 3, I2T_CURRENT_A = 3.5 and IDREF_SPEED5 = -3.2 must not exceed MAXIMUM_CURRENT_A = 2.75"}
+    told = lines_of(tmp_path, MAXIMUM_CURRENT_A="0.5")
+    assert len(told) == 1 and told["Q_CURRENT_REF_OPENLOOP"].endswith(" and 13 more must not exceed MAXIMUM_CURRENT_A = 0.5")
+
+
+@pytest.mark.parametrize("wrong, told", [
+    ({"UNDER_VOLTAGE_V": "30", "OVER_VOLTAGE_V": "20"}, {"OVER_VOLTAGE_V", "UNDER_VOLTAGE_V"}), # no NOMINAL_BUS_V would fit both
+    ({"MINIMUM_SPEED_RPM": "2900", "MAXIMUM_SPEED_RPM": "2000"}, {"NOMINAL_SPEED_RPM", "MAXIMUM_SPEED_RPM"}),
+    ({"OVER_VOLTAGE_V": "20"}, {"OVER_VOLTAGE_V"}), ({"NOMINAL_BUS_V": "12"}, {"UNDER_VOLTAGE_V"})])
+def test_a_value_that_another_may_be_wrong_for_is_no_mistake_of_its_own(tmp_path, wrong, told):
+    assert set(lines_of(tmp_path, **wrong)) == told
+
+
+@pytest.mark.parametrize("text, told", [
+    ("0,1", "= 0,1 is no number: remove the line"), ("", "has no value: remove the line, or write a number"), ("0x", "is no number ("), ("1/10", "= 1/10 divides whole numbers, of which C drops the fraction: write 1.0/10.0"),
+    ("-0.1", "= -0.1 must be positive"), ("2", "must be below 1, its Q format: lower it where a line defines it, else CURRENT_BANDWIDTH_HZ = 1000")])
+def test_a_wrong_gain_of_the_d_axis_is_one_line_that_accuses_no_other(tmp_path, text, told):
+    lines = lines_of(tmp_path, D_CURRCNTR_PTERM=text)
+    assert list(lines) == ["D_CURRCNTR_PTERM"] and lines["D_CURRCNTR_PTERM"].startswith(f"D_CURRCNTR_PTERM {told}")
+
+
 def test_an_entry_of_1_kphi_is_told_beside_other_mistakes_unless_it_may_be_their_fault(tmp_path):
     wrong = value("INVKFI_SPEED3", "19750")
     code, lines = checked(tmp_path, PC, wrong.replace(line_of("LOCK_TIME"), "").replace(line_of("KFILTER_ESDQ"), "#define KFILTER_ESDQ 9\n"))
@@ -222,6 +261,13 @@ def test_every_name_that_a_header_does_not_have_is_told_in_one_build(tmp_path):
     code, lines = checked(tmp_path, PC, "#define NOPOLESPAIRS 5\n#define MY_NOTE 17616\n")
     assert code == 2 and [line.split()[2] for line in lines] == [name for name in parameters() if name != "NOPOLESPAIRS"]
     assert all(line.startswith("foc33: userparams.h: ") and " is missing: add #define " in line for line in lines)
+
+
+def test_a_parameter_that_a_comment_or_an_if_has_swallowed_is_told_with_its_line(tmp_path):
+    for text in (HEADER.replace(line_of("NOPOLESPAIRS"), "#define NOPOLESPAIRS 5 /* pole pairs\n"),
+                 HEADER.replace(line_of("MOTOR_RS_OHM"), "#ifdef MOTOR_B\n" + line_of("MOTOR_RS_OHM") + "#endif\n")):
+        assert checked(tmp_path, PC, text) == (2, [f"foc33: {place(text, 'MOTOR_RS_OHM')}: MOTOR_RS_OHM stands where the compiler does not read: close the comment "
+                                                   "above it with */, or mend the #if around it"])
 
 
 def test_poles_in_place_of_pole_pairs_are_told_by_that_name(tmp_path):
@@ -280,7 +326,8 @@ def test_an1292_s_printed_examples_are_understood(tmp_path, compiler):
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
-@pytest.mark.parametrize("name, form, number", [("LS_OVER2LS0_SPEED1", "Q15(0.25);", "0.25"), ("IDREF_SPEED3", "NORM_CURRENT( -0.27 ) ;", "-0.27"), ("MOTOR_RS_OHM", "2.67;", "2.67")])
+@pytest.mark.parametrize("name, form, number", [("LS_OVER2LS0_SPEED1", "Q15(0.25);", "0.25"), ("IDREF_SPEED3", "NORM_CURRENT( -0.27 ) ;", "-0.27"), ("MOTOR_RS_OHM", "2.67;", "2.67"),
+                                                ("INVKFI_SPEED5", "Q15(0.24);", "Q15(0.24)")])
 def test_a_semicolon_behind_a_number_is_one_line_with_the_number_to_write(tmp_path, compiler, name, form, number):
     text = value(name, form)
     assert checked(tmp_path, compiler, text) == (2, [f"foc33: {place(text, name)}: {name} = {form} ends in a semicolon: write {number}"])

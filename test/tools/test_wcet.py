@@ -12,7 +12,7 @@ from support import command, refused
 
 from tools.bench import wcet as bench
 from tools.common.errors import UserError
-from tools.image import device, wcet
+from tools.image import device, image, wcet
 from tools.image.budget import Budget, CycleLimits, Limits
 from tools.image.facts import Decoder
 from tools.image.program import Elf
@@ -249,3 +249,11 @@ def test_another_header_than_the_delivered_one_is_held_to_the_deadlines_alone(du
     cycles = dataclasses.replace(limits(500, 470).cycles, slow_bound=960)
     lines = wcet.over(bounds, cycles, delivered)
     assert len(lines) == len(broken) and all(words in line for words, line in zip(broken, lines))
+
+
+def test_the_build_s_line_says_which_of_the_paths_is_the_slow_work_s():
+    bounds = [mock.Mock(handler=handler, to=to, cycles=cycles) for handler, to, cycles in (
+        (wcet.INTERRUPT, wcet.THIRD_DUTY, 454), (wcet.INTERRUPT, wcet.RETURN, 481), (wcet.SLOW, wcet.RETURN, 1078))]
+    with mock.patch.object(wcet, "check", return_value=(bounds, [])):
+        text, failures = image.longest_paths(Path("foc33.elf"), mock.Mock(), True)
+    assert (text, failures) == ("longest path of the interrupt 454 cycles to its third duty, 481 cycles to its return, of its slow work 1078 cycles to its return", [])

@@ -106,6 +106,25 @@ void test_a_flux_beyond_its_format_keeps_its_direction(void)
     }
 }
 
+void test_a_whole_look_s_sum_of_two_steps_of_the_converter_in_the_mean_turns_and_a_count_less_stands(void)
+{
+    const uint16_t periods = CATCH_LOOK_STEPS * SLOW_PERIODS;
+    const int16_t turns_q11 = (int16_t)(CATCH_STANDS * periods);
+    static const struct {
+        int16_t alpha, beta, less;
+    } cases[] = { { 1, 0, 0 }, { 0, 1, 0 }, { -1, 0, 0 }, { 0, -1, 0 }, { 1, 1, 1 }, { -1, -1, 1 } };
+    EACH(n, cases) {
+        const int16_t size_q11 = (int16_t)(turns_q11 - cases[n].less);
+        const alphabeta_t sum_q11 = { (int16_t)(cases[n].alpha * size_q11), (int16_t)(cases[n].beta * size_q11) };
+        rig_ready();
+        drive.run.catching.phase = (uint16_t)CATCH_FIRST_LOOK;
+        drive.run.catching.sum_q11 = sum_q11;
+        drive.periods = periods;
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(!cases[n].less, catch_look(&drive, &params), golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].less ? CATCH_NO_LOOK : CATCH_PAUSE, drive.run.catching.phase, golden_row(n));
+    }
+}
+
 /* ---- what follows ---- */
 
 void test_the_pause_between_two_looks_falls_with_the_rotor_s_speed_between_its_ends(void)

@@ -102,15 +102,25 @@ void test_each_part_of_the_slow_work_runs_in_its_own_period_of_eight_sixteen_or_
     }
 }
 
-void test_field_weakening_is_indexed_by_the_reference_and_not_the_speed(void)
+void test_field_weakening_is_indexed_by_the_reference_or_by_twice_the_speed_of_a_rotor_that_was_held(void)
 {
     static const struct {
         int16_t reference_erpm, speed_erpm;
         uint16_t index;
-    } cases[] = { { 8000, 25000, 0 }, { 13000 + 3 * 1024 + 5, 8000, 3 } };
+        held_phase_t phase;
+    } cases[] = { { 8000, 25000, 0, HELD_NOT },
+                  { 13000 + 3 * 1024 + 5, 8000, 3, HELD_NOT },
+                  { 13000 + 3 * 1024 + 5, 13000 / 2 + 3 * 512 + 3, 3, HELD_TURNS },
+                  { -13000 - 3 * 1024 - 5, -13000 / 2 - 3 * 512 - 3, 3, HELD_TURNS },
+                  { 13000 + 3 * 1024 + 5, 13000 / 2 + 520, 1, HELD_TURNS },
+                  { 13000 + 3 * 1024 + 5, -13000 / 2 - 520, 1, HELD_TURNS },
+                  { 13000 + 3 * 1024 + 5, 0, 0, HELD_TURNS },
+                  { -13000 - 3 * 1024 - 5, 0, 0, HELD_TURNS },
+                  { 8000, 0, 0, HELD_TURNS } };
     EACH(n, cases) {
-        rig_closed(1, cases[n].reference_erpm);
+        rig_closed((int16_t)((cases[n].reference_erpm < 0) ? -1 : 1), cases[n].reference_erpm);
         rig_speed(cases[n].speed_erpm);
+        drive.run.held.phase = (uint16_t)cases[n].phase;
         rig_next_part(14);
         rig_tick(1);
         TEST_ASSERT_EQUAL_UINT16(cases[n].index, drive.run.fieldweak.index);

@@ -1,5 +1,5 @@
 /* The forced angle of the start: acceleration, end speed, its time, the fraction that is kept, both directions. */
-#include "control/angle.h"
+#include "control/transforms.h"
 #include "golden.h"
 #include "golden_forced_angle.h"
 #include "unity.h"

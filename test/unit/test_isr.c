@@ -18,7 +18,7 @@ static void maybe_trap(void)
 }
 
 #define pi_preset(pi, gains, err, output) (maybe_trap(), pi_preset(pi, gains, err, output))
-#include "firmware/drive/handover.c"
+#include "firmware/drive/startup.c"
 #undef pi_preset
 
 /* The real tick, with what the hardware may do meanwhile behind it. */

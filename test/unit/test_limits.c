@@ -23,6 +23,7 @@ void test_limits_equal_the_reference(void)
         limited.current_max_q13 = v.maximum;
         limited.current_max_reciprocal = v.reciprocal;
         drive.run.handover.id_q13 = v.wanted_d;
+        drive.run.control.ref_q13.d = v.ref_d; /* it grows no more */
         limits_current(&drive.run, &limited);
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.ref_d, drive.run.control.ref_q13.d, golden_row(n));
         TEST_ASSERT_EQUAL_INT16_MESSAGE(v.iq_limit, drive.run.control.iq_limit_q13, golden_row(n));
@@ -51,6 +52,46 @@ void test_a_current_beyond_its_circle_leaves_the_other_axis_as_little_as_one_at_
     TEST_ASSERT_EQUAL_INT16(at_end, limits_circle(5120, 6554, 5200));
     TEST_ASSERT_EQUAL_INT16(at_end, limits_circle(5120, 6554, 8192));
     TEST_ASSERT_EQUAL_INT16(5119, limits_circle(5120, 6554, 0));
+}
+
+void test_d_current_grows_by_a_slice_a_step_and_goes_at_once(void)
+{
+    const int16_t slice = (int16_t)(params.current_max_q13 >> LIMITS_GROWS_SHIFT);
+    drive.run.control.ref_q13.d = 0;
+    drive.run.fieldweak.table_q13 = -2000;
+    for (int16_t n = 1; n <= 3; n++) {
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(-n * slice, drive.run.control.ref_q13.d);
+    }
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_EQUAL_INT16(-2000, drive.run.control.ref_q13.d);
+    drive.run.fieldweak.table_q13 = 0;
+    limits_current(&drive.run, &params);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.ref_q13.d);
+}
+
+void test_what_flows_far_beyond_the_q_reference_lowers_its_limit_and_is_forgotten(void)
+{
+    const int16_t slice = (int16_t)(params.current_max_q13 >> LIMITS_SLACK_SHIFT);
+    EACH_DIRECTION(direction) {
+        drive_control_t *c = &drive.run.control;
+        int16_t free_limit;
+        c->over_q13 = 0;
+        c->ref_q13.q = (int16_t)(direction * 1000);
+        c->i_q13.q = (int16_t)(direction * (1000 + slice));
+        limits_current(&drive.run, &params);
+        free_limit = c->iq_limit_q13;
+        c->i_q13.q = (int16_t)(direction * (1000 + slice + 800));
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(free_limit - 800, c->iq_limit_q13);
+        c->i_q13.q = 0;
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(free_limit - 700, c->iq_limit_q13);
+        c->ref_q13.q = (int16_t)(-direction * 100);
+        c->i_q13.q = (int16_t)(-direction * 8000); /* more than the limit itself */
+        limits_current(&drive.run, &params);
+        TEST_ASSERT_EQUAL_INT16(0, c->iq_limit_q13);
+    }
 }
 
 void test_d_reference_is_the_sum_of_hand_over_table_trim_and_probe(void)
@@ -88,9 +129,8 @@ void test_missing_q_current_asks_for_voltage_and_current_to_spare_gives_it_back(
         EACH_DIRECTION(direction) {
             if (cases[n].ref_q13 != 0 || direction > 0) { /* without a reference the sign is the positive direction's */
                 drive.run.control.v_q14.q = (int16_t)(direction * 15000);
-                drive.run.control.ref_q13.q = (int16_t)(direction * cases[n].ref_q13);
-                drive.run.control.i_q13.q = (int16_t)(direction * cases[n].i_q13);
-                TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].free_q14, limits_free_voltage(&drive.run.control), golden_row(n));
+                TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n].free_q14, limits_free_voltage(&drive.run.control, (int16_t)(cases[n].ref_q13 - cases[n].i_q13)),
+                                                golden_row(n));
             }
         }
     }
@@ -358,11 +398,15 @@ void test_what_is_burnt_and_field_weakening_share_the_largest_current(void)
 {
     drive.run.control.flux_brake_q13 = 3000;
     drive.run.fieldweak.table_q13 = -1000;
-    limits_current(&drive.run, &params);
+    for (uint16_t n = 0; n < 16u; n++) {
+        limits_current(&drive.run, &params);
+    }
     TEST_ASSERT_EQUAL_INT16(-4000, drive.run.control.ref_q13.d);
     TEST_ASSERT_INT16_WITHIN(20, 3196, drive.run.control.iq_limit_q13); /* sqrt(5120^2 - 4000^2) */
     drive.run.control.flux_brake_q13 = 4960;
-    limits_current(&drive.run, &params);
+    for (uint16_t n = 0; n < 4u; n++) {
+        limits_current(&drive.run, &params);
+    }
     TEST_ASSERT_EQUAL_INT16(-4960, drive.run.control.ref_q13.d);
 }
 

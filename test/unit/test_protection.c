@@ -1,7 +1,8 @@
 /* Protection: over-current in the same period, bus trips within a slow step, stall and lost lock only when they last. */
+#include "drive_rig.h"
+
 #include "drive/protection.h"
 #include "drive/signals.h"
-#include "drive_rig.h"
 
 void setUp(void)
 {

@@ -5,7 +5,6 @@
 #undef RETRY_COUNT
 #define RETRY_COUNT 3
 
-#include "drive/remote.h"
 
 #include "law.c"
 #include "panel_rig.h"

@@ -80,7 +80,7 @@ void test_kphi_of_little_flux_stays_in_its_format(void)
         weak.fieldweak.inv_kfi[n] = 30000;
     }
     drive.run.salience.id_q13 = (int16_t)(3 * tenth());
-    drive_update_model(&drive.run, &weak, 8000);
+    drive_update_model(&drive.run, &weak, 8000, 8000);
     TEST_ASSERT_EQUAL_INT16(32767, drive.run.model.inv_kfi);
 }
 

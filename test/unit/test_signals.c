@@ -523,7 +523,7 @@ void test_what_proves_nothing_is_halved_and_what_has_ended_is_forgotten(void)
 void test_evidence_that_comes_and_goes_for_long_is_halved_and_ends_in_no_fault(void)
 {
     EACH_DIRECTION(sign) {
-        rig_closed(1, 10000);
+        rig_closed(1, 5000);
         drive.frame = trig_sincos(0x2000);
         int32_t expected;
         for (uint32_t n = 0; n < 140000ul; n++) { /* a minute */
@@ -536,6 +536,46 @@ void test_evidence_that_comes_and_goes_for_long_is_halved_and_ends_in_no_fault(v
         }
         expected = (int32_t)(drive.run.evidence.checks * ROOT_OF_HALF * drive.run.observer.innovation_erpm);
         TEST_ASSERT_INT32_WITHIN(params.load_erpm * 4, expected, drive.run.evidence.once.sine);
+        TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+    }
+}
+
+void test_what_is_wrong_on_and_off_in_time_with_the_angle_is_judged_after_100_ms_of_fast_turns(void)
+{
+    static const struct {
+        int16_t erpm;
+        uint16_t order; /* in fifths */
+        drive_fault_t fault;
+    } cases[] = { { 6100, 5, FAULT_CURRENT_SENSOR }, { -6100, 10, FAULT_CURRENT_SENSOR }, { 6100, 4, FAULT_NONE }, { 6100, 1, FAULT_NONE }, { 5900, 5, FAULT_NONE }, { -5900, 5, FAULT_NONE } };
+    EACH(n, cases) {
+        uint16_t checks = 0;
+        rig_closed(1, 10000);
+        rig_speed(cases[n].erpm);
+        while (drive.fault == (uint16_t)FAULT_NONE && checks < 5000u) {
+            const uint32_t turned = (uint32_t)checks * 7001u;
+            drive.frame = trig_sincos((angle_t)turned);
+            drive.run.observer.innovation_erpm = qm_mulhi(600, trig_sincos((angle_t)(turned * cases[n].order / 5u)).cos);
+            drive.run.observer.wrong_steps = (uint16_t)(1u + checks % 4u);
+            signals_check(&drive, &params);
+            signals_judge(&drive, &params);
+            checks++;
+        }
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].fault, drive.fault, golden_row(n));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE((cases[n].fault == FAULT_NONE) ? 5000u : 251u, checks, golden_row(n));
+        drive.fault = (uint16_t)FAULT_NONE;
+    }
+}
+
+void test_what_is_wrong_on_and_off_and_swings_with_no_field_accuses_nobody_however_large_it_is(void)
+{
+    rig_closed(1, 10000); /* as after a held shaft, while the observer stood still */
+    for (uint16_t checks = 0; checks < 5000u; checks++) {
+        drive.frame = trig_sincos((angle_t)((uint32_t)checks * 7001u));
+        drive.run.observer.innovation_erpm = (int16_t)(params.load_erpm + 500u);
+        drive.run.observer.wrong_steps = (uint16_t)(1u + checks % 4u);
+        signals_check(&drive, &params);
+        drive.run.evidence.unexplained = drive.run.evidence.checks;
+        signals_judge(&drive, &params);
         TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
     }
 }

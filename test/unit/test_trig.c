@@ -1,5 +1,5 @@
 /* Sine, cosine and the circle limit: every angle, every table entry among them, and the errors that the header promises. */
-#include "control/angle.h"
+#include "control/transforms.h"
 #include "golden.h"
 #include "golden_circle.h"
 #include "golden_sincos.h"

@@ -24,12 +24,25 @@ def variant_name(defines: list[str], userparams: Path | None = None) -> str:
 
 def app(text: str, where: str, beside: Path | None = None) -> str:
     """The entry for an application: a name of firmware/app, or a file, also one beside the file that names it."""
-    if (paths.ROOT / "firmware" / "app" / f"{text}.c").is_file():
+    known = sorted(path.stem for path in (paths.ROOT / "firmware" / "app").glob("*.c"))
+    if text in known:
         return APP + text
-    for path in (Path(text), *([beside.parent / text] if beside else [])):
+    places = [Path(text), *([beside.parent / text] if beside else [])]
+    for path in places:
         if path.is_file():
             return APP + str(path.resolve())
-    raise UserError(f"no application '{text}'", where, suggestion(text, sorted(path.stem for path in (paths.ROOT / "firmware" / "app").glob("*.c"))))
+    if any(path.is_dir() for path in places):
+        raise UserError(f"'{text}' is a folder", where, "name the C file in it")
+    if any(Path(f"{path}.c").is_file() for path in places):
+        raise UserError(f"no file '{text}'", where, f"did you mean '{text}.c'?")
+    if "/" in text or text.endswith(".c"):
+        raise UserError(f"no file '{text}'", where, f"name a C file, or one of {', '.join(known)}")
+    raise UserError(f"no application '{text}'", where, suggestion(text, known))
+
+
+def app_shown(defines: list[str]) -> str:
+    """The application in a list of macros, as a report names it; "" for panel, which is in every other build."""
+    return next((_app_path(define.removeprefix(APP)) for define in defines if define.startswith(APP)), "")
 
 
 def has_line(defines: list[str]) -> bool:

@@ -142,7 +142,7 @@ def set_up(item: Any, options: argparse.Namespace, defines: list[str]) -> tuple[
     library = library_for(defines, options.library, userparams)
     if options.board:
         _refuse_other_period(board_file.load(options.board, "--board"), library)
-    told = used(motor, library, header_name(options.library, userparams)) | {"board": str(paths.shown(board.path))}
+    told = used(motor, library, header_name(options.library, userparams)) | {"board": str(paths.shown(board.path)), "app": build.app_shown(defines)}
     return motor, board, library, told
 
 

@@ -189,6 +189,7 @@ def used_lines(data: dict[str, Any]) -> list[str]:
     if "header" not in data:
         return []
     lines = [f"motor   {data['motor']}: {data['motor_title']}", f"header  {data['header']}"]
+    lines += [f"app     {data['app']}"] if data.get("app") else []
     return lines + ([f"note    {data['note']}"] if data["note"] else [])
 
 

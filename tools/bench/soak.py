@@ -64,6 +64,8 @@ class Segment:
     scenario: Scenario
     rests: list[tuple[float, float, float]] = field(default_factory=list)
     starts: int = 1
+    holds: int = 0
+    """how often a hand holds the shaft"""
 
 
 @dataclass
@@ -72,7 +74,7 @@ class Soak(draws.Series):
 
     name, about = "soak", "motor hours of random commands, loads, temperatures, sags, noise: nothing may trip"
     what, unit, file, told = "segment", "motor hours", "segments.csv", 20
-    keys = ("segment", "motor", "mode", "motor_s", "starts", "stretches", "worst_speed_error_percent", "worst_angle_error_deg", "verdict")
+    keys = ("segment", "motor", "mode", "motor_s", "starts", "holds", "stretches", "worst_speed_error_percent", "worst_angle_error_deg", "verdict")
 
     @classmethod
     def add_command(cls, commands: Any) -> argparse.ArgumentParser:
@@ -126,8 +128,12 @@ class Soak(draws.Series):
             own = [row for row in rows if row["motor"] == name]
             lines.append(f"{name:28} {sum(row['motor_s'] for row in own) / 3600.0:8.3f} h {sum(row['starts'] for row in own):6d} starts "
                          f"{sum(row['stretches'] for row in own):6d} stretches, worst speed error {max(row['worst_speed_error_percent'] for row in own):.2f} %, "
-                         f"{sum(map(self.is_bad, own))} wrong")
-        return "\n".join(lines)
+                         f"{sum(map(self.is_bad, own))} wrong, {sum(self.is_bad(row) for row in own if row['holds'])} of them with a held shaft")
+        return "\n".join([*lines, self._in_short(rows)])
+
+    def _in_short(self, rows: list[dict[str, Any]]) -> str:
+        """How many end well: the last line of the text, the headline of the page."""
+        return f"{len(rows) - sum(map(self.is_bad, rows))} of {len(rows)} segments without a fault"
 
     def worst(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         return sorted(rows, key=lambda row: (not self.is_bad(row), 0.0 if self.is_bad(row) else -row["worst_speed_error_percent"]))[:12]
@@ -135,8 +141,9 @@ class Soak(draws.Series):
     def page(self, rows: list[dict[str, Any]]) -> tuple[dict[str, Any], page.Page]:
         bad, hours = sum(map(self.is_bad, rows)), sum(row["motor_s"] for row in rows) / 3600.0
         title = f"{hours:.3f} motor hours, seed {self.seed}"
-        return {"title": title, "passed": not bad, "motor_hours": hours, "wrong": bad}, page.Page(
-            f"soak: {title}", not bad, f"{len(rows) - bad} of {len(rows)} segments without a fault", self.text(rows).splitlines())
+        held = [self.is_bad(row) for row in rows if row["holds"]]
+        return {"title": title, "passed": not bad, "motor_hours": hours, "wrong": bad, "held": len(held), "wrong_held": sum(held)}, page.Page(
+            f"soak: {title}", not bad, self._in_short(rows), self.text(rows).splitlines()[:-1])
 
 
 def prepared(names: list[str]) -> dict[tuple[str, str], Bench]:
@@ -172,7 +179,7 @@ class _Drawing:
         self.settle_s = max(8.0 / param(self.params, "SPEED_BANDWIDTH_HZ"), 0.7)
         self.events: list[Event] = []
         self.rests: list[tuple[float, float, float]] = []
-        self.rpm, self.load_nm, self.starts, self.now_s, self.true_l = 0.0, 0.0, 0, 0.2, r.uniform(*TRUE_L)
+        self.rpm, self.load_nm, self.starts, self.holds, self.now_s, self.true_l = 0.0, 0.0, 0, 0, 0.2, r.uniform(*TRUE_L)
 
     def segment(self) -> Segment:
         values = {"rng.seed": float(self.r.randrange(1, 2**31)), "adc.noise_lsb": self.r.uniform(0.3, 1.5),
@@ -187,7 +194,7 @@ class _Drawing:
         scenario = Scenario(f"segment {self.number}", f"{self.name} {self.mode}".strip(), "", "", "", round(self.now_s, 3), defines=[self.mode] if self.mode else [],
                             events=sorted(self.events, key=lambda event: event.at_s), rotor_deg=float(self.r.randrange(360)),
                             plant=Values(values, {key: WHERE for key in values}))
-        return Segment(self.number, self.name, self.mode, scenario, self.rests, self.starts)
+        return Segment(self.number, self.name, self.mode, scenario, self.rests, self.starts, self.holds)
 
     def _warm(self) -> list[tuple[str, float, tuple[float, float]]]:
         return [("motor.rs_ohm", float(self.plant["motor.rs_ohm"]), WARM_R), ("motor.psi_vs", float(self.plant["motor.psi_vs"]), WARM_PSI)]
@@ -297,6 +304,7 @@ class _Drawing:
 
     def _held(self) -> None:
         """A hand on the shaft, harder than the drive, and off again."""
+        self.holds += 1
         most_nm = param(self.params, "MAXIMUM_CURRENT_A") * reach.torque_per_amp(self.plant)
         self._set({BRAKE: self.load_nm + self.r.uniform(*HOLD_TORQUES) * most_nm}, 0.002)
         self.now_s += self.r.uniform(*HOLD_S)
@@ -335,7 +343,7 @@ def row_of(segment: Segment, found: Run, rated_rpm: float) -> dict[str, Any]:
     errors = [error for rest in segment.rests if (error := _speed_error(trace, rest, rated_rpm)) is not None]
     angle_deg = _angle_error_deg(found)
     return {"segment": segment.number, "motor": segment.motor, "mode": segment.mode, "motor_s": round(found.motor_s, 2), "starts": segment.starts,
-            "stretches": len(errors), "worst_speed_error_percent": round(max((abs(error) for _, error, _ in errors), default=0.0), 3),
+            "holds": segment.holds, "stretches": len(errors), "worst_speed_error_percent": round(max((abs(error) for _, error, _ in errors), default=0.0), 3),
             "worst_angle_error_deg": round(angle_deg, 1), "verdict": verdict(found, errors, angle_deg)}
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from tools.common import motor_file
 from tools.common.board_keys import Part, Values
-from tools.common.param_rows import slow_periods
+from tools.common.param_rows import phase_ohm, slow_periods
 
 from . import injection, judge, memory, pil, simulate
 from .board import Board, Library
@@ -228,7 +228,7 @@ def dead_rpm(params: dict[str, float]) -> float:
 
 def start_dead(params: dict[str, float]) -> float:
     """Dead time's voltage over R I of the start."""
-    return _dead_v(params) / (param(params, "MOTOR_RS_OHM") * param(params, "Q_CURRENT_REF_OPENLOOP"))
+    return _dead_v(params) / (phase_ohm(params) * param(params, "Q_CURRENT_REF_OPENLOOP"))
 
 
 def _dead_v(params: dict[str, float]) -> float:

@@ -396,8 +396,9 @@ def _check(motor: Motor) -> None:
         fail(key, f"friction at rated speed, {friction_nm:.3g} N m, exceeds the rated torque", "check the unit of friction")
     acceleration_s = motor.inertia_kgm2 * rated_rad_s / motor.rated_torque_nm
     if not 1e-3 <= acceleration_s <= SLOWEST_S:
+        load = ", and give what the motor drives as inertia of [load]" if acceleration_s > SLOWEST_S else ""
         fail("inertia", f"rated torque would bring the bare rotor to rated speed in {acceleration_s:.3g} s",
-                   f"0.001 .. {SLOWEST_S:g} s are usual; check the unit of inertia")
+                   f"0.001 .. {SLOWEST_S:g} s are usual; check the unit of inertia{load}")
     _check_limits(motor, fail)
     problems.tell()
 

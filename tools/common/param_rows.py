@@ -59,6 +59,11 @@ def slow_periods(period_s: float) -> int:
     return int(number("SLOW_PERIODS_IN_TIME")) * (2 if duties_are_late(period_s) else 1)
 
 
+def phase_ohm(params: Mapping[str, float]) -> float:
+    """The estimator's resistance, PARAM_PHASE_OHM of scaling/estimator.h: winding, and the bridge's where a header has it."""
+    return params["MOTOR_RS_OHM"] + params.get("BRIDGE_RS_OHM", 0.0)
+
+
 @functools.cache
 def parameters() -> dict[str, Parameter]:
     """Every parameter by name, in the order of the table."""

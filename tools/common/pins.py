@@ -107,7 +107,16 @@ def _problem(key: str, pin: Pin) -> str:
 
 def differences(pins: dict[str, str]) -> list[str]:
     """The lines of include/board/mclv.h to change before the firmware fits these pins."""
-    return [f"#define BOARD_PIN_{key.upper()} {name[1]}, {name[2:]}" for key, name in pins.items() if name != firmware()[key].pin]
+    changed = {f"BOARD_PIN_{key.upper()}": name for key, name in pins.items() if name != firmware()[key].pin}
+    if pins.get("uart_tx") == _other_tx():
+        changed["BOARD_OTHER_TX"] = firmware()["uart_tx"].pin
+    return [f"#define {macro} {name[1]}, {name[2:]}" for macro, name in changed.items()]
+
+
+def _other_tx() -> str:
+    """The pin that BRINGUP tries beside the serial line's own."""
+    port, bit = re.search(r"^#define BOARD_OTHER_TX (\w), (\d+)", SOURCE.read_text(encoding="utf-8"), re.MULTILINE).groups()
+    return f"R{port}{bit}"
 
 
 def page() -> list[list[str]]:

@@ -62,6 +62,11 @@ class Document:
     def _syntax(self, message: str) -> tuple[str, str]:
         place = re.search(r"\(at (?:line (\d+), column (\d+)|end of document)\)", message)
         line = int(place[1]) if place and place[1] else len(self.text.splitlines())
+        text = self.text.splitlines()[line - 1] if line <= len(self.text.splitlines()) else ""
+        if comma := re.search(r"=\s*([-+]?\d+),(\d+)", text):
+            return f"{self.label} line {line}", f"write {comma[1]}.{comma[2]}, with a decimal point"
+        if message.startswith("Cannot overwrite a value") and (key := re.match(r"\s*([A-Za-z0-9_.\-\"']+)\s*=", text)):
+            return f"{self.label} line {line}", f"{key[1]} stands twice in its table: remove one of the two"
         reason = re.sub(r"\s*\(at .*\)", "", message)
         reason = re.sub(r"\('([^()]*?)',?\)", lambda match: "[" + match[1].replace("', '", ".") + "]", reason)
         return f"{self.label} line {line}", reason[:1].lower() + reason[1:]

@@ -124,7 +124,7 @@ const unsigned probe_signal_count = sizeof probe_signals / sizeof probe_signals[
 const probe_param_t probe_params[] = {
     PARAM_TABLE(PARAM_ENTRY) { "COUNT_CURRENT_A", CURRENT_A(1), "A" }, { "COUNT_VOLTAGE_V", VOLTAGE_V(1), "V" }, { "COUNT_SPEED_RPM", SPEED_RPM(1), "rpm" },
     { "CURRENT_KP_D", 16.0F * PARAM_F(D_CURRCNTR_PTERM) / PARAM_IU, "V/A" }, { "CURRENT_KP_Q", 16.0F * PARAM_F(Q_CURRCNTR_PTERM) / PARAM_IU, "V/A" },
-    { "CURRENT_KI", PARAM_F(Q_CURRCNTR_ITERM) / PARAM_IU, "V/A" }
+    { "CURRENT_KI", PARAM_F(Q_CURRCNTR_ITERM) / PARAM_IU, "V/A" }, { "BRIDGE_RS_OHM", PARAM_F(BRIDGE_RS_OHM), "ohm" }
 };
 const unsigned probe_param_count = sizeof probe_params / sizeof probe_params[0];
 

@@ -66,7 +66,7 @@ SOURCES = {
     "demo_40khz": Source((f"run SCENARIO=demo_40khz {AT_40KHZ} OUT=build/run/demo_40khz",)),
     "table2_40khz": Source((f"table2 {AT_40KHZ} OUT=build/run/table2_40khz",)),
     "cycles_40khz": Source((f"tune {AT_40KHZ}", f"cycles SCENARIO=demo_40khz USERPARAMS={HEADER_40KHZ} OUT=build/target/40khz"), "chip"),
-    **{name: Source((name,), takes="by name", left=f"{name}/seed-1/summary.json") for name in ("campaign", "soak")},
+    **{name: Source((name,), takes="by name", left=f"{name}/seed-1/summary.json", counts=name == "soak") for name in ("campaign", "soak")},
     "applications": Source(tuple(f"run APP={name}" for name in APPLICATIONS),
                            pictures=tuple((f"run/app_{name}-app-{name.replace('_', '-')}/speed.png", f"app-{name}.png") for name in APPLICATIONS)),
     "tests": Source(("test", "coverage"), takes="found", left="test/summary.json"),
@@ -204,7 +204,7 @@ def make(command: str, counts: bool = False) -> None:
     done = subprocess.run([sys.executable, "-m", "tools.common.progress", f"make {command}", *quietly], cwd=ROOT, env=environment, check=False)
     if done.returncode:
         told = log.read_text(encoding="utf-8", errors="replace").strip().splitlines() or [f"exit status {done.returncode}"]
-        held = [line for line in told if counts and re.fullmatch(r"\d+ of \d+ expectations hold", line)]
+        held = [line for line in told if counts and re.fullmatch(r"\d+ of \d+ (expectations hold|segments without a fault)", line)]
         if held:
             print(f"    {held[-1]}", flush=True)
             return

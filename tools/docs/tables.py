@@ -114,7 +114,7 @@ def selftest() -> str:
 def scope() -> str:
     services = rows("include", "board/scope.h", "LNET_SERVICE_TABLE", "#number #name meaning", also="tools/cpu_host")
     errors = rows("include", "board/scope.h", "LNET_ERROR_TABLE", "#number #name meaning", also="tools/cpu_host")
-    modes = rows("include", "drive/remote.h", "REMOTE_MODE_TABLE", "#number #name meaning")
+    modes = rows("include", "drive/request.h", "REMOTE_MODE_TABLE", "#number #name meaning")
     return "\n".join(table(f"{head}, name, meaning", "rll", [list(row) for row in found])
                      for head, found in (("service", services), ("error", errors), ("mode of scope_command", modes)))
 

@@ -147,7 +147,8 @@ def deepest_stack(elf: Path, objdump: str, budget: Budget) -> tuple[int, list[st
 def longest_paths(elf: Path, budget: Budget, delivered: bool) -> tuple[str, list[str]]:
     """The control interrupt's longest paths in a line, and what is wrong with them."""
     bounds, failures = wcet.check(elf, budget.cycles, delivered)
-    return "longest path of the interrupt " + ", ".join(f"{bound.cycles} cycles to its {bound.to}" for bound in bounds), failures
+    return ", ".join(("longest path of the interrupt " if not number else "of its slow work " if bound.handler == wcet.SLOW else "")
+                     + f"{bound.cycles} cycles to its {bound.to}" for number, bound in enumerate(bounds)), failures
 
 
 def start_up_bytes(elf: Path, budget: Budget) -> int:

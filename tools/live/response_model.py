@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tools.common import motor_file
+from tools.common.param_rows import phase_ohm
 from tuning import loops
 
 from . import response
@@ -65,10 +66,10 @@ def plants(params: Mapping[str, float], motor: motor_file.Motor | None) -> tuple
     """The motor, and what the header says of it; without a motor file both are the header's."""
     pairs, lq = int(params["NOPOLESPAIRS"]), 1e-3 * params["MOTOR_LS_MH"]
     psi = params["MOTOR_KPHI_V_PER_KRPM"] / (1000.0 * np.pi / 30.0 * pairs * np.sqrt(3.0))
-    header = loops.Plant(params["MOTOR_RS_OHM"], lq - 1e-6 * params["MOTOR_SALIENCY_UH"], lq, psi, pairs, params["MOTOR_INERTIA_KGM2"])
+    header = loops.Plant(phase_ohm(params), lq - 1e-6 * params["MOTOR_SALIENCY_UH"], lq, psi, pairs, params["MOTOR_INERTIA_KGM2"])
     if motor is None:
         return header, header
-    return loops.Plant(motor.rs_ohm, motor.ld_h, motor.lq_h, motor.psi_vs, motor.pole_pairs, motor.inertia_kgm2 + motor.load_inertia_kgm2,
+    return loops.Plant(motor.rs_ohm + params.get("BRIDGE_RS_OHM", 0.0), motor.ld_h, motor.lq_h, motor.psi_vs, motor.pole_pairs, motor.inertia_kgm2 + motor.load_inertia_kgm2,
                        motor.viscous_nms), header
 
 

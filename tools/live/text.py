@@ -22,6 +22,8 @@ ANSWER_S = 0.3
 TRIES = 3
 RENEW_S = 0.5
 """How often a running motor hears of its client; without it stops after 2 s (TEXT_SILENT_MS)."""
+MOST_RPM = 32767
+"""A longer number is no number to the drive."""
 COMMANDS = ("run", "speed", "stop", "status", "fault", "clear")
 ANSWER = re.compile(r"(\w+) run ([01]) speed (-?\d+) fault (\w+)")
 REMEDIES = {"range": "choose a speed between MINIMUM_SPEED_RPM and MAXIMUM_SPEED_RPM", "refused": "clear the fault first",
@@ -36,8 +38,10 @@ class Status:
     speed_rpm: int
     fault: str
 
-    def text(self) -> str:
-        return f"{'runs' if self.running else 'stands'}, {self.speed_rpm} rpm, fault {self.fault}"
+    def text(self, told: str = "") -> str:
+        """In words, of a drive that was told this."""
+        doing = "stops" if told == "stop" else "runs"
+        return f"{doing if self.running else 'stands'}, {self.speed_rpm} rpm, fault {self.fault}"
 
 
 def checked(line: str) -> str:
@@ -99,6 +103,10 @@ def _arguments(arguments: list[str] | None) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if options.command == "speed" and options.rpm is None:
         parser.error("speed needs a number: speed 1500")
+    if options.rpm is not None and options.command not in ("run", "speed"):
+        parser.error(f"{options.command} takes no number: leave out {options.rpm}")
+    if options.rpm is not None and abs(options.rpm) > MOST_RPM:
+        parser.error(f"{options.rpm} rpm is no speed of the drive: {REMEDIES['range']}")
     return options
 
 
@@ -107,7 +115,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.rpm is not None:
         drive.command(f"speed {options.rpm}")
     status = drive.command("status" if options.command == "speed" else options.command)
-    print(status.fault if options.command == "fault" else status.text(), flush=True)
+    print(status.fault if options.command == "fault" else status.text(options.command), flush=True)
     if options.command == "run":
         try:
             for status in drive.run(options.seconds):
@@ -116,7 +124,7 @@ def _run(options: argparse.Namespace) -> int:
                     return 1
         except KeyboardInterrupt:
             print()
-        print(drive.command("stop").text())
+        print(drive.command("stop").text("stop"))
     return 0
 
 

@@ -19,7 +19,7 @@ fi
 for hook in app_init app_ms; do
     grep -qE "^ *void +$hook *\(" "$source" || { echo "foc33: no $hook() in $shown: an application has app_init() and app_ms() (include/app/app.h)" >&2; exit 2; }
 done
-"$@" -c "$source" -o "$object"
+"$@" -Werror -c "$source" -o "$object" # as for the chip: what turns on the PC does not fail there
 listed=${object%.o}.d
 [ ! -f "$listed" ] || printf '%s:\n' "$source" >>"$listed" # an application that has another name now is no rule to miss
 for name in $("$nm" -u "$object" | sed 's/.* //'); do

@@ -95,7 +95,7 @@ $X/app.from: FORCE | target-input
 	$(call remember,$(app_source))
 
 $X/app.o: $(app_source) $X/app.from $X/flags tools/make/app.sh | $X/params
-	$(call say,xc16,$(app_shown))tools/make/app.sh $@ $< $(call quoted,$(app_shown)) $(xc16)nm $(target_compile) -MMD -MP
+	$(call say,xc16,$(call quoted,$(app_shown)))tools/make/app.sh $@ $< $(call quoted,$(app_shown)) $(xc16)nm $(target_compile) -MMD -MP
 
 $X/image.o: $X/image.c $X/flags | $X/params
 	$(call say,xc16,$<)$(target_compile) $(target_whole) -MMD -MP -c $< -o $@

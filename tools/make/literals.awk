@@ -45,4 +45,6 @@ BEGIN {
     else if (text ~ /\// && floating != text && text !~ /[%&|^~<>?!"']/ && text !~ /\/[ \t(]*0+(\.0*)?[fF]?[ \t)]*$/ && text !~ /NORM_/) # what has a quotient, no division by 0 (param_check.c tells of it), and operators that a float has
         refuse("fraction", "__builtin_fabsf((float)(" text ") - (float)(" floating ")) > 0.00001F * __builtin_fabsf((float)(" floating "))", \
                name " = " text " divides whole numbers, of which C drops the fraction: write " floating)
+    else if (text !~ /^[-+]?[0-9.]+$/) # what is no C at all has the compiler's words beside its name
+        print "PARAM_CHECK(range_of_" name ") { (void)((float)(" name ")); }"
 }

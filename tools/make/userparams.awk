@@ -1,21 +1,23 @@
 # What in userparams.h cannot be meant: a name that is defined twice with two values or is close to a missing one, a constant of AN1292's header, a
 # number that ends in a semicolon, a value that comes back to itself.
 #
-#   awk -v places=FILE -v least=FILE -v refused=FILE -v near=FILE -v foreign=FILE -f tools/make/nearest.awk -f tools/make/userparams.awk KNOWN DEFINED
+#   awk -v places=FILE -v least=FILE -v optional=FILE -v refused=FILE -v near=FILE -v foreign=FILE \
+#       -f tools/make/nearest.awk -f tools/make/userparams.awk KNOWN DEFINED
 #
 # KNOWN: the rows of the tables of parameters and modes, with @ between the cells; DEFINED: userparams.h as gcc -E -dD shows it, with line
-# markers. To the files go: where each parameter stands (name, file:line, range, with tabs between them); the least value of each (name, value);
-# the names that are refused; the missing names that they may stand for; values with a word that the header does not define (name, message).
+# markers. To the files go: where each parameter stands (name, file:line, range, with tabs between them); the least value of each (name, value); the
+# optional ones and modes that have a value; the names that are refused; the missing names that they may stand for; values with a word that the
+# header does not define (name, message).
 
 function refuse(name, what) {
     print "foc33: " what
     print name >>refused
 }
 
-# The number to write for AN1292's "Q15(0.25);".
-function plain(text) {
+# The number to write for AN1292's "Q15(0.25);": without Q15() unless it is one of Q15 here, too.
+function plain(text, range) {
     sub(/[ \t]*;[ \t;]*$/, "", text)
-    if (text ~ /^(Q15|NORM_CURRENT)[ \t]*\([^()]*\)$/) {
+    if (range !~ /Q15/ && text ~ /^(Q15|NORM_CURRENT)[ \t]*\([^()]*\)$/) {
         sub(/^[^(]*\([ \t]*/, "", text)
         sub(/[ \t]*\)$/, "", text)
     }
@@ -142,8 +144,9 @@ END {
         if (name in known) {
             print name "\t" place[name] "\t" known[name] >places
             if (value[name] ~ /;[ \t]*$/)
-                refuse(name, place[name] ": " name " = " value[name] " ends in a semicolon: write " plain(value[name]))
+                refuse(name, place[name] ": " name " = " value[name] " ends in a semicolon: write " plain(value[name], known[name]))
             else if (name in ranged) tell_stray(name)
+            else if (value[name] != "") print name >>optional
         }
         else if (place[name] != option && !index(used, " " name " ")) { # what another macro uses is the user's own
             meant = nearest(name, missing, 0.83)

@@ -1,7 +1,7 @@
 /* IDENTIFY: the drive measures R, Ld, Lq, Kphi, inertia and friction of an unknown motor. */
 #include "drive/modes/identify.h"
 
-#include "control/angle.h"
+#include "control/transforms.h"
 #include "drive/drive.h"
 #include "drive/states.h"
 

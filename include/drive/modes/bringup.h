@@ -49,7 +49,7 @@
 
 /** X(name, remedy): what can be wrong. ~ stands for a phase. A remedy names what to look at first, then the line to change. */
 #define BRINGUP_FINDING_TABLE(X) \
-    X(UART_PIN, "BOARD_PIN_UART_TX in include/board/mclv.h: take the other pin") \
+    X(UART_PIN, "swap BOARD_PIN_UART_TX and BOARD_OTHER_TX in include/board/mclv.h") \
     X(BUTTON_DOWN, "a button is down at rest: BOARD_PIN_S2, BOARD_PIN_S3 in include/board/mclv.h") \
     X(BUTTONS_SWAPPED, "swap BOARD_PIN_S2 and BOARD_PIN_S3 in include/board/mclv.h") \
     X(BUTTON_DEAD, "no other button came: BOARD_PIN_S2, BOARD_PIN_S3 in include/board/mclv.h") \

@@ -10,7 +10,7 @@
 #ifndef DRIVE_MODES_PROFILE_H
 #define DRIVE_MODES_PROFILE_H
 
-#include "control/angle.h"
+#include "control/transforms.h"
 #include "drive/forward.h"
 #include "drive/param_scaling.h"
 

@@ -6,7 +6,7 @@
  *     hand-over: from w = 2 pi 20 Hz (PARAM_EARLY_HZ) or 1.25 times the minimum speed on; the estimator's lock is as quick as the rotor turns
  *     i2t:   dh/dt = (i^2 - h)/T, too hot from h = I2T_CURRENT_A^2                        (drive/protection.h)
  *     flux:  E - V_dead - (R's part) - (L's part) > F E (1 + k)                           (drive/protection.h)
- *     NTC:   R(T) = R25 exp(B (1/T - 1/T25)), share of the reference at the converter R/(R + Rd)    (drive/heat.h)
+ *     NTC:   R(T) = R25 exp(B (1/T - 1/T25)), share of the reference at the converter R/(R + Rd)    (drive/protection.h)
  *     d current off: noise, and V_dead/Kp, what dead time drives against its controller   (drive/signals.h)
  *
  * Times in steps of the slot that counts them (drive/schedule.h); the tolerances are those that make robust promises

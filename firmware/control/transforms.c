@@ -1,5 +1,5 @@
 /* Angles: sine and cosine from a table of 128 steps a turn, the circle sqrt(1 - x^2), and the angle that a start forces on the rotor. */
-#include "control/angle.h"
+#include "control/transforms.h"
 
 INLINE sincos_t trig_sincos(angle_t angle)
 {
