@@ -35,6 +35,7 @@ def test_an_application_in_utf_16_is_called_so(tmp_path, encoding):
     ('#include "drive/drive.h"\n' + HOOKS, '#include "drive/drive.h" in shown.c: an application sees app/ alone'),
     ("#include <math.h>\n" + HOOKS, "#include <math.h> in shown.c: an application sees app/ alone"),
     (HOOKS.replace("app_ms", "my_ms"), "no app_ms() in shown.c"), (HOOKS.replace("app_init", "start"), "no app_init() in shown.c"),
+    (HOOKS.replace("void app_ms", "int app_ms"), "int app_ms(void); in shown.c, line 2: write void app_ms( as include/app/app.h has it"),
     (HOOKS.replace("app_ms(void) {}", "app_ms(void) { extern int board_drive; board_drive = 0; }"), "board_drive in shown.c: an application reaches nothing but"),
     (HOOKS.replace("app_ms(void) {}", "app_ms(void) { extern void drive_raise(int); drive_raise(1); }"), "drive_raise in shown.c: an application reaches nothing but")])
 def test_an_application_that_reaches_into_the_drive_is_refused_in_one_line_and_leaves_no_object(tmp_path, text, says):

@@ -118,6 +118,7 @@ def test_a_port_that_goes_away_is_told_in_one_line(monkeypatch, capsys):
 
 @pytest.mark.parametrize("words, told", [
     (["speed"], "speed needs a number: speed 1500"), (["stop", "1500"], "stop takes no number: leave out 1500"),
+    (["halt"], "no command 'halt', SAY: use run, speed, stop, status, fault, clear"),
     (["run", "-99999"], "-99999 rpm is no speed of the drive: choose a speed between MINIMUM_SPEED_RPM and")])
 def test_what_the_drive_would_not_understand_is_refused_in_one_line_and_nothing_is_said(monkeypatch, capsys, words, told):
     monkeypatch.setattr(text.lnet, "open_port", lambda port: pytest.fail("the port was opened"))

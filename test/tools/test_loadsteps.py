@@ -56,11 +56,18 @@ def test_a_load_that_stops_the_rotor_before_the_drive_can_answer_is_too_quick():
 def test_27_steps_are_asked_for_and_another_motor_gets_the_same_shares_of_its_rating_within_its_header():
     assert (STEPS.speeds_rpm, STEPS.torques_nm, STEPS.kphi_factors) == ([500.0, 1190.0, 2500.0], [0.03, 0.05, 0.08], [0.8, 1.0, 1.2])
     hurst, linix = motor_file.load(HURST), motor_file.load(LINIX)
-    other = STEPS.for_motor(linix, {"MINIMUM_SPEED_RPM": 1000.0, "MAXIMUM_SPEED_RPM": 3000.0})
+    other = STEPS.for_motor(linix, {"MINIMUM_SPEED_RPM": 1000.0, "MAXIMUM_SPEED_RPM": 3000.0, "SPEED_BANDWIDTH_HZ": 12.0})
     assert other.speeds_rpm == [1000.0, pytest.approx(1190.0 / hurst.rated_speed_rpm * linix.rated_speed_rpm, rel=0.005), 3000.0]
     share = linix.rated_torque_nm / hurst.rated_torque_nm
     assert other.torques_nm == pytest.approx([share * torque for torque in (0.03, 0.05, 0.08)], rel=0.005)
     assert (other.dip_percent, other.unloaded_rpm, other.back_s) == ([], [], STEPS.back_s)
+
+
+def test_a_slow_speed_loop_gets_the_time_in_which_it_ends_a_dip():
+    linix = motor_file.load(LINIX)
+    slow = STEPS.for_motor(linix, {"MINIMUM_SPEED_RPM": 1000.0, "MAXIMUM_SPEED_RPM": 3000.0, "SPEED_BANDWIDTH_HZ": 0.5})
+    assert slow.back_s == pytest.approx(3.912 / (2.0 * math.pi * 0.5), rel=1e-3) # exp(-3.912) = 2 %
+    assert slow.hold_s / STEPS.hold_s == slow.settle_s / STEPS.settle_s == slow.unloaded_s / STEPS.unloaded_s == pytest.approx(slow.back_s / 0.3)
 
 
 def steps(**changes):

@@ -97,10 +97,12 @@ class TextDrive:
 def _arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser = command_line.Parser(prog="python3 -m tools.live.text", description=__doc__.splitlines()[0])
     parser.add_argument("port", help="serial port, or the pseudo-terminal that make live-board APP=text names")
-    parser.add_argument("command", choices=COMMANDS)
+    parser.add_argument("command", help=", ".join(COMMANDS))
     parser.add_argument("rpm", nargs="?", type=int, help="of run and speed, with its sign the direction")
     parser.add_argument("--seconds", type=float, default=float("inf"), help="of run; default: until Ctrl-C")
     options = parser.parse_args(arguments)
+    if options.command not in COMMANDS:
+        raise UserError(f"the text application has no command '{options.command}'", "SAY", f"use {', '.join(COMMANDS)}")
     if options.command == "speed" and options.rpm is None:
         parser.error("speed needs a number: speed 1500")
     if options.rpm is not None and options.command not in ("run", "speed"):

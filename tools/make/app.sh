@@ -17,7 +17,11 @@ if [ -n "$first" ]; then
     exit 2
 fi
 for hook in app_init app_ms; do
-    grep -qE "^ *void +$hook *\(" "$source" || { echo "foc33: no $hook() in $shown: an application has app_init() and app_ms() (include/app/app.h)" >&2; exit 2; }
+    grep -qE "^ *void +$hook *\(" "$source" && continue
+    line=$(grep -nE "^[ a-z0-9_]*[ *]$hook *\(" "$source" | head -n 1 || true)
+    [ -z "$line" ] || { echo "foc33: ${line#*:} in $shown, line ${line%%:*}: write void $hook( as include/app/app.h has it" >&2; exit 2; }
+    echo "foc33: no $hook() in $shown: an application has app_init() and app_ms() (include/app/app.h)" >&2
+    exit 2
 done
 "$@" -Werror -c "$source" -o "$object" # as for the chip: what turns on the PC does not fail there
 listed=${object%.o}.d
