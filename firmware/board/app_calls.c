@@ -1,6 +1,6 @@
 /* What an application calls: shares, units, lights; where APP_SERIAL is 1, the serial line: lines heard and said, words, numbers, the checksum; where
  * APP_PULSE is 1, the pulses at the command input. The linker drops what it does not call. */
-#include "board/app_calls.h"
+#include "board/application.h"
 
 #include "app/line.h"
 #include "app/pulse.h"

@@ -1,8 +1,6 @@
 /* The seam between the application's room and the drive: what it is told, what it asks, and how long it may take. */
 #include "board/application.h"
 
-#include "app/app.h"
-#include "board/app_calls.h"
 #include "board/firmware.h"
 #include "board/mclv.h"
 #include "board/reset.h"

@@ -1,7 +1,6 @@
 /* Start-up order and the background loop: panel, supervision of the control interrupt, watch variables, status line. */
 #include "board/firmware.h"
 
-#include "board/app_calls.h"
 #include "board/application.h"
 #include "board/kept.h"
 #include "board/mclv.h"

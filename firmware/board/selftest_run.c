@@ -2,7 +2,6 @@
 #include "board/selftest_run.h"
 
 #ifndef SELFTEST_OFF
-#include "board/app_calls.h"
 #include "board/application.h"
 #include "board/firmware.h"
 #include "board/peripherals.h"

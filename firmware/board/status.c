@@ -1,7 +1,7 @@
 /* The status line: composed in the background, sent a character a pass. */
 #include "board/status.h"
 
-#include "board/app_calls.h"
+#include "board/application.h"
 #include "board/kept.h"
 #include "board/scope.h"
 #include "board/modes/mode_board.h"

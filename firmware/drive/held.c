@@ -250,12 +250,14 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
 }
 
 /** The rotor stands, and the drive pushes: does it go? A frame that was turned back settles first, or its own voltage would be a rotor's. */
-static void held_push(drive_t *d, const drive_params_t *p, uint16_t moved)
+static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
 {
     held_t *shaft = &d->run.held;
     if (shaft->act == (uint16_t)HELD_WAITS) { /* else the frame is turned back first */
         if (moved > (uint16_t)p->adaptation.emf_least_q12 && shaft->steps > HELD_REST_STEPS) {
-            shaft->act = (uint16_t)HELD_GOES_ON;
+            const uint16_t grows = (uint16_t)(along_direction(d, emf.q) < 0 && shaft->steps > HELD_REST_STEPS + HELD_ASK_STEPS);
+            shaft->act = (uint16_t)(grows ? HELD_LEARN : HELD_GOES_ON); /* the current grows, and R is less than was learnt */
+            shaft->emf_q12 = emf;
             return;
         }
         if (shaft->steps <= 2u * HELD_PULL_STEPS && qm_abs(d->run.control.ref_q13.q) >= d->run.control.iq_limit_q13) { /* ahead, and back */
@@ -288,7 +290,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
         shaft->emf_q12 = emf;
         break;
     case HELD_ASKED: held_compare(d, p, emf, moved); break;
-    default: held_push(d, p, moved); break; /* HELD_STANDS */
+    default: held_push(d, p, emf, moved); break; /* HELD_STANDS */
     }
 }
 

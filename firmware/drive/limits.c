@@ -4,12 +4,6 @@
 #include "drive/protection.h"
 #include "drive/speed.h"
 
-/** What the q current lacks of its reference, in the reference's direction. */
-static current_q13_t limits_missing(const drive_control_t *c)
-{
-    return qm_with_sign((int16_t)(c->ref_q13.q - c->i_q13.q), c->ref_q13.q);
-}
-
 INLINE voltage_q14_t limits_free_voltage(const drive_control_t *c, current_q13_t missing_q13)
 {
     return (int16_t)(c->vq_limit_q14 - qm_abs(c->v_q14.q) - LIMITS_MISSING_Q14 * qm_clamp(missing_q13, -LIMITS_MISSING_MOST_Q13, LIMITS_MISSING_MOST_Q13));
@@ -26,15 +20,15 @@ INLINE uint16_t limits_brakes(current_q13_t iq_q13, int16_t turns)
 }
 
 /** 1 while the q current brakes and the bus leaves less of it than the circle. With no braking current at all its reference is 0, which has no sign. */
-static uint16_t limits_bus_is_narrower(const drive_control_t *c, speed_erpm_t speed)
+static uint16_t limits_bus_is_narrower(const drive_control_t *c, const drive_params_t *p, speed_erpm_t speed)
 {
-    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && (c->ref_q13.q == 0 || limits_brakes(c->ref_q13.q, speed)));
+    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && (c->ref_q13.q == 0 || limits_brakes(c->ref_q13.q, speed)) && c->brake_limit_q13 < limits_asked_most(p));
 }
 
 void limits_flux_brake(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
-    const uint16_t bus_holds = (uint16_t)(limits_bus_is_narrower(c, observer_speed(&run->observer)) && qm_abs(c->ref_q13.q) == c->brake_limit_q13);
+    const uint16_t bus_holds = (uint16_t)(limits_bus_is_narrower(c, p, observer_speed(&run->observer)) && qm_abs(c->ref_q13.q) == c->brake_limit_q13);
     const int16_t step = (int16_t)(bus_holds ? FLUX_BRAKE_STEP_Q13 : -FLUX_BRAKE_STEP_Q13);
     c->flux_brake_q13 = qm_clamp((int16_t)(c->flux_brake_q13 + step), 0, p->flux_brake_most_q13);
 }
@@ -66,7 +60,7 @@ void limits_current(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
     const current_q13_t grown_q13 = (int16_t)(c->ref_q13.d - (p->current_max_q13 >> LIMITS_GROWS_SHIFT)); /* q current makes room first */
-    const current_q13_t missing_q13 = limits_missing(c), slack_q13 = (int16_t)(p->current_max_q13 >> LIMITS_SLACK_SHIFT);
+    const current_q13_t missing_q13 = qm_with_sign((int16_t)(c->ref_q13.q - c->i_q13.q), c->ref_q13.q), slack_q13 = (int16_t)(p->current_max_q13 >> LIMITS_SLACK_SHIFT);
     current_q13_t id_q13 = run->probe_id_q13;
     fieldweak_trim(&run->fieldweak, &p->fieldweak, limits_free_voltage(c, missing_q13), estimator_speed(&run->estimator));
     if (!held_angle_stands(&run->held)) { /* a rotor that stands needs none but a probe's: it would turn the vector away from q */
@@ -175,7 +169,7 @@ static uint16_t limits_current_reasons(const drive_control_t *c, const drive_par
 {
     int16_t limit = c->iq_limit_q13;
     uint16_t reason = (uint16_t)LIMIT_CURRENT;
-    if (limits_bus_is_narrower(c, speed)) {
+    if (limits_bus_is_narrower(c, p, speed)) {
         limit = c->brake_limit_q13;
         reason = (uint16_t)LIMIT_BRAKE;
     } else if (limits_drive_less(p) && c->limited_by != (uint16_t)LIMIT_NONE) {

@@ -32,14 +32,17 @@ def test_sixty_drawn_faults_end_in_a_named_stop_or_are_ridden_through(tmp_path, 
                 if row["class"] == judge.SILENT]
 
 
-def test_three_minutes_of_random_operation_show_no_fault_no_drift_and_no_lost_lock(tmp_path, monkeypatch):
+def test_three_minutes_of_random_operation_show_no_fault_no_drift_and_no_lost_lock_but_a_named_stop_after_a_held_shaft(tmp_path, monkeypatch):
     monkeypatch.setattr(soak, "prepared", lambda names: {(HURST, ""): bench()})
     monkeypatch.setattr(soak, "MODES", ("",))
-    code = cli.main(["soak", "--hours", "0.05", "--quiet", "--out", str(tmp_path / "out")])
+    cli.main(["soak", "--hours", "0.05", "--quiet", "--out", str(tmp_path / "out")])
     rows = list(csv.DictReader((tmp_path / "out" / "segments.csv").open(encoding="utf-8")))
-    assert code == 0, [row["verdict"] for row in rows]
+    stopped = [row for row in rows if int(row["holds"]) and row["verdict"].startswith("trips: ")] # README: unless a hand holds the shaft
+    well = [row for row in rows if row not in stopped]
+    assert len(stopped) <= 1 and {row["verdict"] for row in well} == {soak.OK}, [row["verdict"] for row in rows]
+    assert sum(not int(row["holds"]) for row in well) >= 1 and sum(int(row["holds"]) for row in well) >= 1
     assert len(rows) == 5 and sum(float(row["motor_s"]) for row in rows) >= 180.0 and sum(int(row["stretches"]) for row in rows) >= 15
-    assert max(float(row["worst_speed_error_percent"]) for row in rows) <= 1.5
+    assert max(float(row["worst_speed_error_percent"]) for row in well) <= 1.5
 
 
 @pytest.mark.parametrize("key, worse", [("load.locked", 1.0), ("fault.isr_lost_share", 0.2)])

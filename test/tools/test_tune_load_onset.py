@@ -62,7 +62,8 @@ def test_the_virtual_board_holds_the_speed_that_the_model_names_and_not_those_be
     bench = lowspeed.LowSpeed(table, motor_file.part(HURST), board_file.part("mclv"), Library(library(["PARAMS_IN_RAM"])), quiet=True)
     minimum = replace(of(HURST).choices["MINIMUM_SPEED_RPM"], text="60")
     named = load_onset.lowest_rpm(replace(of(HURST), choices=of(HURST).choices | {"MINIMUM_SPEED_RPM": minimum}), TORQUE_NM)
-    below = [share * named for share in (0.55, 0.6, 0.67, 0.75, 0.87)]
-    verdicts = [row["verdict"] for row in bench.run([(speed, TORQUE_NM) for speed in (named, *below)], "low")]
-    assert verdicts[0] == "ok" and verdicts[-1] != "ok", (named, verdicts)  # nor the next one below it
-    assert verdicts[1:].count("ok") <= 1, (named, verdicts)  # a load that comes at a happy moment is held now and then
+    below, next_below = (0.55, 0.6, 0.67, 0.71, 0.75, 0.79), (0.82, 0.84, 0.86, 0.88, 0.9, 0.92, 0.94)
+    held = {share: row["verdict"] == "ok" for share, row in
+            zip((1.0, *below, *next_below), bench.run([(share * named, TORQUE_NM) for share in (1.0, *below, *next_below)], "low"))}
+    assert held[1.0] and not any(held[share] for share in below), (named, held)
+    assert sum(not held[share] for share in next_below) >= 2, (named, held)  # there the moment at which the load comes decides

@@ -787,6 +787,26 @@ void test_a_back_emf_that_moves_as_the_frame_has_been_turned_back_is_a_rotor_tha
     }
 }
 
+void test_a_back_emf_against_the_direction_that_comes_while_the_current_grows_is_resistance_that_is_less_and_one_at_once_is_a_rotor(void)
+{
+    EACH_DIRECTION(direction) {
+        const int16_t against_q12 = (int16_t)(-direction * (params.adaptation.emf_least_q12 + 20));
+        int16_t known;
+        stands(direction, 200);
+        known = qm_hi(drive.run.adaptation.rs_q31);
+        steps(HELD_REST_STEPS + HELD_ASK_STEPS - 1u);
+        rig_emf(0, against_q12);
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
+        TEST_ASSERT_LESS_THAN_INT16(known, qm_hi(drive.run.adaptation.rs_q31));
+        TEST_ASSERT_EQUAL_INT16(0, estimator_emf(&drive.run.estimator).q);
+        steps(HELD_REST_STEPS + HELD_ASK_STEPS - 1u);
+        rig_emf(0, against_q12);
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    }
+}
+
 void test_a_back_emf_that_fell_in_a_question_is_asked_for_again_and_then_stands(void)
 {
     const int16_t fallen_q12 = (int16_t)(400 - params.adaptation.emf_least_q12); /* too far to have stood, too little to have turned */

@@ -87,6 +87,10 @@ void test_current_is_the_reason_from_one_32nd_below_its_limit(void)
         expect(LIMIT_CURRENT, "braking, and the bus would take more");
         drive.run.control.brake_limit_q13 = 3200;
         expect(LIMIT_CURRENT, "the bus takes as much");
+        drive.run.control.iq_limit_q13 = params.current_max_q13;
+        drive.run.control.brake_limit_q13 = limits_asked_most(&params); /* below the circle, for braking never asks for more */
+        drive.run.control.ref_q13.q = (int16_t)(-way * limits_asked_most(&params));
+        expect(LIMIT_CURRENT, "the bus takes all that is asked of it");
     }
 }
 
