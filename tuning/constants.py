@@ -83,7 +83,7 @@ def header(params: Mapping[str, str]) -> Header:
             relations.append(rest)
         elif params[rest] != "NORM_INVKFIBASE" or not any(message.startswith("MOTOR_KPHI") for message in relations):
             p = parameters()[rest]
-            outside.append(f"{rest} = {params[rest]} is outside {p.low} .. {p.high} {p.unit}")
+            outside.append(f"{rest} = {params[rest]} is outside {p.span}")
     if any(message.startswith("MOTOR_KPHI") for message in relations): # what it breaks in turn is not told
         relations = [message for message in relations if "of NORM_INVKFIBASE" not in message]
     return Header(constants, relations + outside)

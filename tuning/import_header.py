@@ -308,7 +308,7 @@ def _plan_tune(plan: Plan) -> None:
         row = parameters()[name]
         value = float(f"{value:.3g}") if row.unit.startswith("A") else float(f"{value:.5g}") # a count is coarser
         if not float(row.low) <= value <= float(row.high):
-            plan.dropped.append(f"{name} = {value:g} is outside {row.low} .. {row.high} {row.unit}: the tuner chooses one")
+            plan.dropped.append(f"{name} = {value:g} is outside {row.span}: the tuner chooses one")
         elif name == "END_SPEED_RPM" and value > found.nominal_rpm:
             plan.dropped.append(f"END_SPEED_RPM = {value:g} is above NOMINAL_SPEED_RPM: the tuner chooses one")
         else:

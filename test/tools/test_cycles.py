@@ -156,6 +156,14 @@ def test_comparison_with_the_pc(ticks, differences, first, defines, has_names, o
     assert outcome.ok == ok and got in outcome.got
 
 
+def test_a_difference_after_a_late_application_names_it(monkeypatch):
+    run = support.run()
+    monkeypatch.setattr(type(run), "raised", lambda self: [(20, 0.001, "APPLICATION")])
+    late = pil_command.comparison(pil.PilRun(run, NO_CYCLES, 100, 4, "tick 7")).got
+    assert late.endswith("the application took longer than APP_LATE_MS on the chip (fault APPLICATION), and a PC does not count its time")
+    assert "APP_LATE_MS" not in pil_command.comparison(pil.PilRun(run, NO_CYCLES, 100, 0, "")).got
+
+
 # ---- for the user --------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("target", ["pil", "cycles", "wcet", "test-target"])
 def test_without_the_compiler_each_command_says_so_in_one_line(tmp_path, target):

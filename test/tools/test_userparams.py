@@ -64,7 +64,7 @@ def value(name: str, text: str) -> str:
 
 def range_of(name: str) -> str:
     p = parameters()[name]
-    return f"{p.low} .. {p.high} {p.unit} ({p.meaning})"
+    return f"{p.low} .. {p.high}{' ' * (p.unit != '1')}{p.unit if p.unit != '1' else ''} ({p.meaning})"
 
 
 def place(text: str, name: str) -> str:
@@ -511,7 +511,7 @@ def test_what_is_missing_is_told_with_the_user_s_own_path(tmp_path, words):
     done = make(*words, "VARIANT=refused", f"USERPARAMS={folder}")
     lines = [line for line in done.stderr.splitlines() if line.startswith("foc33: ")]
     assert done.returncode == 2 and len(lines) == 2 and lines[0].startswith(f"foc33: {folder}/userparams.h: MOTOR_RS_OHM is missing: "), lines
-    assert lines[1].startswith(f"foc33: {folder}/userparams.h:") and "KCURRA = 5 is outside" in lines[1], lines
+    assert lines[1].startswith(f"foc33: {folder}/userparams.h:") and "KCURRA = 5 is outside -0.6 .. 0.6 (gain" in lines[1], lines
 
 
 def test_who_runs_a_header_hears_of_every_mistake(tmp_path):

@@ -38,6 +38,11 @@ class Parameter:
     stem: str = ""
     """of the table whose entry this is"""
 
+    @property
+    def span(self) -> str:
+        """The range as a message tells it: a bare number has no unit."""
+        return f"{self.low} .. {self.high}" + (f" {self.unit}" if self.unit != "1" else "")
+
 
 @functools.cache
 def number(name: str) -> float:

@@ -130,6 +130,7 @@ match($0, /In function .(range|text|relations)_(of_)?[A-Za-z0-9_]+/) {
 }
 match($0, /error: userparams\.h: /) {
     text = substr($0, RSTART + RLENGTH)
+    if (match(text, / \.\. [-0-9.]+ 1 \(/)) text = substr(text, 1, RSTART + RLENGTH - 5) " (" substr(text, RSTART + RLENGTH) # of no unit
     first = text
     sub(/ .*/, "", first)
     checked = 1
