@@ -85,10 +85,7 @@ static q15_t observer_loaded(const observer_t *o, const observer_params_t *p, cu
 void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t speed, current_q13_t iq_q13)
 {
     int16_t rate, wrong = (int16_t)(p->gate_erpm + (speed >> OBSERVER_GATE_SPEED_SHIFT));
-    q15_t loaded = observer_loaded(o, p, iq_q13), share = 32767, quick = o->fast_share_q15;
-    if (o->pulses && quick < loaded) {
-        quick = loaded;
-    }
+    q15_t loaded = observer_loaded(o, p, iq_q13), share = 32767;
     if (speed < p->full_erpm) {
         share = qm_share((uint16_t)speed, (uint16_t)p->full_erpm);
     }
@@ -97,7 +94,7 @@ void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t s
     share = observer_between(share, observer_twice(share), loaded);
     o->share_q15 = share;
     rate = observer_between(rate, observer_between(0, p->loaded_q16, share), loaded);
-    o->rate_q16 = observer_between(rate, observer_between(0, p->fast_q16, share), quick);
+    o->rate_q16 = observer_between(rate, observer_between(0, p->fast_q16, share), o->fast_share_q15);
     /* without load dead time may make a light rotor hunt for long: twice as much is not wrong then */
     wrong = (int16_t)((wrong > 16383) ? 16383 : wrong);
     o->wrong_erpm = observer_between((int16_t)(2 * wrong), wrong, loaded);

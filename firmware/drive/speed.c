@@ -83,22 +83,14 @@ uint16_t speed_swings(const drive_run_t *run)
     return (uint16_t)(run->control.swing_steps > 3u * SPEED_SWING_STEPS);
 }
 
-/** Takes a step of the trim into the memory of swings. One to a side that lasts longer than a wrong signal's, which turns with the field or twice as fast,
- *  is a load's. @param size_erpm of the reference: an error of a part of it is a swing's */
-static void speed_remember_swing(drive_run_t *run, const drive_params_t *p, int16_t error, speed_erpm_t size_erpm)
+/** Takes a step of the trim into the memory of swings. @param swings 1: the error is as large as a swing's */
+static void speed_remember_swing(drive_control_t *c, int16_t error, uint16_t swings)
 {
-    drive_control_t *c = &run->control;
-    if (qm_beyond(error, size_erpm >> SPEED_SWING_SHIFT) && (c->swing_steps & SPEED_SWING_MASK) == 0u && (error ^ c->swung_erpm) < 0) {
-        const int16_t part_q16 = qm_hi(qm_mulss(size_erpm, p->observer.deltat_q32)); /* a sixteenth of what a step turns */
-        const uint16_t most = 4u * SPEED_SWING_STEPS, took = (uint16_t)(most - c->swing_steps);
+    if (swings && (c->swing_steps & SPEED_SWING_MASK) == 0u && (error ^ c->swung_erpm) < 0) {
         c->swung_erpm = error;
-        c->swing_steps = (uint16_t)((took > SPEED_SWING_STEPS) ? c->swing_steps + SPEED_SWING_STEPS : most);
-        run->observer.pulses = (uint16_t)(took < SPEED_SWING_STEPS && took > SPEED_PULSE_STEPS && qm_beyond(c->swing_load, 2 * p->observer.load_from)
-                                          && qm_mulsu(part_q16, took) > (int32_t)(PARAM_F(SPEED_PULSE_TURN) * 65536.0F / 16.0F));
+        c->swing_steps = (uint16_t)((c->swing_steps < 4u * SPEED_SWING_STEPS) ? c->swing_steps + SPEED_SWING_STEPS : c->swing_steps);
     } else if (c->swing_steps != 0u) {
         c->swing_steps--;
-        c->swing_load = observer_between(c->swing_load, qm_hi(run->observer.load_q16), SPEED_PULSE_LOAD_Q15);
-        run->observer.pulses &= speed_swings(run);
     } else { /* as a rule */
     }
 }
@@ -125,7 +117,7 @@ void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_e
     const int16_t most_q10 = (int16_t)(p->current_max_q13 >> (3 + SPEED_TRIM_MOST_SHIFT));
     int16_t before = qm_abs(before_erpm);
     int32_t trim_q26 = c->iq_trim_q26;
-    speed_remember_swing(run, p, error, before);
+    speed_remember_swing(c, error, qm_beyond(error, before >> SPEED_SWING_SHIFT));
     if (c->reference_erpm != before_erpm || (!swings && (qm_beyond(error, before >> SPEED_TRIM_ERROR_SHIFT) || !speed_is_calm(run, iq_q13)))) {
         trim_q26 -= trim_q26 >> SPEED_TRIM_LEAK_SHIFT;
     } else if (swings || !speed_load_moves_against(run, error)) {

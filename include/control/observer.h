@@ -46,7 +46,6 @@ typedef struct {
     int16_t gate_last_erpm;  /**< the last large innovation */
     uint16_t gate_level;     /**< four for each step that was not calm, less one for each that was */
     q15_t share_q15;         /**< of the full rates, by the speed */
-    uint16_t pulses;         /**< 1: a load that pulses with the shaft, which the quick rate follows as far as there is load */
 } observer_t;
 
 /** Speed, electrical rpm. */

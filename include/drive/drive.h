@@ -112,7 +112,6 @@ typedef struct {
     speed_erpm_t trim_reference_erpm; /**< the reference at its last step */
     speed_erpm_t swung_erpm;          /**< its sign is that of the last large error */
     uint16_t swing_steps;             /**< large errors to either side, SPEED_SWING_STEPS each, less the time since */
-    int16_t swing_load;               /**< the load's mean while it swings, in units of the load observer */
     int16_t iq_rest_q26;              /**< what its last step left below a whole count of q current */
     current_q13_t sample_shift_q13;   /**< q current that the sample misses at this speed */
 } drive_control_t;

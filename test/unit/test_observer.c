@@ -287,22 +287,6 @@ void test_load_that_takes_no_current_counts_as_none(void)
     }
 }
 
-void test_load_that_pulses_is_followed_at_the_quick_rate_as_far_as_there_is_load(void)
-{
-    enum { QUIET = GOLDEN_OBSERVER_QUIET_Q16, FAST = GOLDEN_OBSERVER_FAST_Q16 };
-    o.fast_share_q15 = 0;
-    o.pulses = 1;
-    o.load_q16 = 4000L * 65536;
-    observer_schedule(&o, p, 10000, 8000);
-    TEST_ASSERT_INT16_WITHIN(FAST / 100, FAST, o.rate_q16);
-    o.load_q16 = 0;
-    observer_schedule(&o, p, 10000, 8000);
-    TEST_ASSERT_INT16_WITHIN(2, QUIET, o.rate_q16);
-    o.fast_share_q15 = 32767; /* what is quick stays so */
-    observer_schedule(&o, p, 10000, 8000);
-    TEST_ASSERT_INT16_WITHIN(FAST / 100, FAST, o.rate_q16);
-}
-
 /* ---- innovations that do not end ---- */
 
 static uint16_t wrong_after(uint16_t steps, uint32_t counts)

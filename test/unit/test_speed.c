@@ -233,45 +233,6 @@ void test_a_load_step_is_no_swing_and_neither_are_small_errors_or_one_side(void)
     }
 }
 
-/** Does the load pulse, after fifty swings of so many steps each? @param load in units of the least that counts as one */
-static uint16_t pulses_after(int16_t reference_erpm, uint16_t steps, int16_t load)
-{
-    const int16_t part = (int16_t)(reference_erpm / 4);
-    rig_closed(1, reference_erpm);
-    drive.run.observer.load_q16 = (int32_t)load * params.observer.load_from * 65536;
-    (void)trim_of_swings(50, steps, (int16_t)(reference_erpm - part), (int16_t)(reference_erpm + part));
-    return drive.run.observer.pulses;
-}
-
-void test_swing_to_either_side_that_lasts_for_three_quarters_of_a_turn_of_the_field_is_a_load_s(void)
-{
-    static const struct {
-        const char *what;
-        int16_t reference_erpm;
-        uint16_t steps, pulses;
-    } cases[] = {
-        { "half a turn of the field", 1000, 38, 0 }, { "a turn of the field", 1000, 76, 1 },   { "a turn at twice the speed", 2000, 40, 1 },
-        { "half of one there", 2000, 20, 0 },        { "three turns in 13 ms", 15000, 16, 0 }, { "a few turns in 20 ms", 15000, 25, 1 },
-        { "a turn, and no swing", 1000, 160, 0 },
-    };
-    EACH_DIRECTION(sign) {
-        EACH(n, cases) {
-            TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].pulses, pulses_after((int16_t)(sign * cases[n].reference_erpm), cases[n].steps, (int16_t)(sign * 4)), cases[n].what);
-        }
-        TEST_ASSERT_EQUAL_UINT16(0, pulses_after((int16_t)(sign * 1000), 76, sign)); /* hunting has little load */
-        TEST_ASSERT_EQUAL_UINT16(1, pulses_after((int16_t)(sign * 1000), 76, 3));    /* whatever its sign */
-    }
-}
-
-void test_load_pulses_no_more_when_the_speed_swings_no_more(void)
-{
-    TEST_ASSERT_TRUE(pulses_after(1000, 76, 4));
-    (void)trim_after(SPEED_SWING_STEPS - 100u, 1000);
-    TEST_ASSERT_TRUE(speed_swings(&drive.run) && drive.run.observer.pulses);
-    (void)trim_after(100, 1000);
-    TEST_ASSERT_FALSE(speed_swings(&drive.run) || drive.run.observer.pulses);
-}
-
 void test_swings_are_forgotten_in_an_eighth_of_a_second_and_not_remembered_for_longer(void)
 {
     uint16_t steps = 0;
