@@ -86,10 +86,28 @@ def test_the_successor_xc_dsc_is_found_by_its_own_names_where_there_is_no_xc16(t
 
 
 # ---- with it -------------------------------------------------------------------------------------------------------------
+AFTER_NEG = re.compile(r"\b(?:neg|subbr)\.w [^\n]*\n[^\n]*\bbra +(?:LT|GE|GT|LE),", re.IGNORECASE)
+"""XC16 takes the flags of a negation for those of a comparison with 0, also of a number that wraps: -32768 is then at least 0."""
+
+
+def compares_what_wraps(elf: Path) -> list[str]:
+    """The places of an image where a branch hangs on a negation's flags."""
+    listing = subprocess.run([program("objdump"), "-d", elf], capture_output=True, text=True, check=True).stdout
+    return AFTER_NEG.findall(listing)
+
+
 @needs_compiler
 @pytest.mark.parametrize("word", ["OPT=-O1", "OPT=-O3"])
 def test_no_warning_and_a_good_image_at_every_level(word):
     build_image(word, "VARIANT=check")
+    assert not compares_what_wraps(ROOT / f"build/target{word.removeprefix('OPT=')}-check/foc33.elf")
+
+
+@needs_compiler
+def test_a_branch_on_the_flags_of_a_number_that_wraps_is_found(tmp_path):
+    (tmp_path / "a.c").write_text("int f(unsigned a) { int d = (int)(0u - a); return d >= 0 ? d : 7; }\n", encoding="utf-8")
+    subprocess.run([program("gcc"), f"-mcpu={device.NAME}", "-omf=elf", "-O2", "-c", "a.c", "-o", "a.o"], cwd=tmp_path, check=True)
+    assert compares_what_wraps(tmp_path / "a.o")
 
 
 @needs_compiler
@@ -97,6 +115,7 @@ def test_the_hex_starts_the_program_and_serves_the_control_interrupt():
     build_image()
     elf, words = (read(ROOT / "build/target" / name) for read, name in ((image.read_elf, "foc33.elf"), (image.read_hex, "foc33.hex")))
     assert words[0] == 0x040000 | elf.symbols["__reset"]
+    assert not compares_what_wraps(ROOT / "build/target/foc33.elf")
     for base in (device.IVT, device.AIVT):
         assert words[base + 2 * device.VECTORS.index("_ADC1Interrupt")] == elf.symbols["__ADC1Interrupt"]
         assert words[base + 2 * device.VECTORS.index("_T3Interrupt")] == elf.symbols["__DefaultInterrupt"]
