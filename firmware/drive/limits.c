@@ -20,15 +20,15 @@ INLINE uint16_t limits_brakes(current_q13_t iq_q13, int16_t turns)
 }
 
 /** 1 while the q current brakes and the bus leaves less of it than the circle. With no braking current at all its reference is 0, which has no sign. */
-static uint16_t limits_bus_is_narrower(const drive_control_t *c, const drive_params_t *p, speed_erpm_t speed)
+static uint16_t limits_bus_is_narrower(const drive_control_t *c, speed_erpm_t speed)
 {
-    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && (c->ref_q13.q == 0 || limits_brakes(c->ref_q13.q, speed)) && c->brake_limit_q13 < limits_asked_most(p));
+    return (uint16_t)(c->brake_limit_q13 < c->iq_limit_q13 && (c->ref_q13.q == 0 || limits_brakes(c->ref_q13.q, speed)));
 }
 
 void limits_flux_brake(drive_run_t *run, const drive_params_t *p)
 {
     drive_control_t *c = &run->control;
-    const uint16_t bus_holds = (uint16_t)(limits_bus_is_narrower(c, p, observer_speed(&run->observer)) && qm_abs(c->ref_q13.q) == c->brake_limit_q13);
+    const uint16_t bus_holds = (uint16_t)(limits_bus_is_narrower(c, observer_speed(&run->observer)) && qm_abs(c->ref_q13.q) == c->brake_limit_q13);
     const int16_t step = (int16_t)(bus_holds ? FLUX_BRAKE_STEP_Q13 : -FLUX_BRAKE_STEP_Q13);
     c->flux_brake_q13 = qm_clamp((int16_t)(c->flux_brake_q13 + step), 0, p->flux_brake_most_q13);
 }
@@ -169,7 +169,7 @@ static uint16_t limits_current_reasons(const drive_control_t *c, const drive_par
 {
     int16_t limit = c->iq_limit_q13;
     uint16_t reason = (uint16_t)LIMIT_CURRENT;
-    if (limits_bus_is_narrower(c, p, speed)) {
+    if (limits_bus_is_narrower(c, speed) && c->brake_limit_q13 < limits_asked_most(p)) { /* more is never asked for */
         limit = c->brake_limit_q13;
         reason = (uint16_t)LIMIT_BRAKE;
     } else if (limits_drive_less(p) && c->limited_by != (uint16_t)LIMIT_NONE) {
