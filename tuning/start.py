@@ -58,6 +58,12 @@ LOUD_SHARE = 0.1
 """Share beyond which starts fail from some angles."""
 
 
+CALMER_SHARE = 0.8 * LOUD_SHARE
+CALMER_CURRENTS, CALMER_ENDS, CALMEST_END_SHARE = (1.0, 0.85, 0.7), (1.15, 1.3, 1.45), 0.75
+"""Where the lock cannot be long enough: less current swings less, and at a higher speed the same swing matters less. Shares of the rules' values; the speed
+at the end is at most so much of the nominal one."""
+
+
 @dataclass(frozen=True)
 class StartDesign:
     """The start's parameters in SI and what they were made from."""
@@ -225,10 +231,21 @@ def try_start(motor: Motor, inertia: float, damping: float, current_a: float, lo
 def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, maximum_a: float, trip_a: float, nominal_rpm: float,
                  fixed: dict[str, float]) -> StartDesign:
     """All of it. `fixed` holds what the motor file's [tune] says; the trial only changes what is not fixed."""
-    inertia = motor.inertia_kgm2 + motor.load_inertia_kgm2
     first = needed_torque(motor, 0.3 * nominal_rpm)
     current = fixed.get("Q_CURRENT_REF_OPENLOOP") or start_current(motor, maximum_a, trip_a, first)
     end = fixed.get("END_SPEED_RPM") or end_speed(motor, board, current, nominal_rpm)
+    design = _timed(motor, board, plant, gains, current, end, fixed)
+    if not design.loud or {"LOCK_TIME", "Q_CURRENT_REF_OPENLOOP", "OPENLOOP_RAMPSPEED_INCREASERATE", "END_SPEED_RPM"} & set(fixed):
+        return design
+    others = (_timed(motor, board, plant, gains, float(f"{share * current:.3g}"), digits_up(factor * end, 2), fixed)
+              for share in CALMER_CURRENTS if share * current >= design.needed_nm / (motor.kt_nm_per_a * LOAD_ANGLE_SINE)
+              for factor in CALMER_ENDS if factor * end <= CALMEST_END_SHARE * nominal_rpm)
+    return next((other for other in others if other.follows and other.trial.swing_rpm <= CALMER_SHARE * other.end_speed_rpm), design)
+
+
+def _timed(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, current: float, end: float, fixed: dict[str, float]) -> StartDesign:
+    """Lock and ramp for a current and a speed at the end."""
+    inertia = motor.inertia_kgm2 + motor.load_inertia_kgm2
     minimum = fixed.get("MINIMUM_SPEED_RPM") or minimum_speed(motor, board)
     rate = int(fixed.get("OPENLOOP_RAMPSPEED_INCREASERATE", 0)) or ramp_rate(motor, board, current, end, inertia)
     omega = natural_rad_s(motor, current, inertia)
