@@ -360,16 +360,13 @@ def of_start(d: Design) -> list[str]:
         return []
     why = ": with so little inductance the current's sample, after the pulse's centre, feeds the swing" if s.damping < 0.0 else ""
     return [warning(f"the unloaded rotor still swings by {s.trial.swing_rpm:.0f} rpm when the estimator takes over at {s.end_speed_rpm:g} rpm, and may fail "
-                    f"to start from some angles{why}", *start_ways(d, lambda x: x.follows and x.trial.swing_rpm < SURELY_CALM * start.LOUD_SHARE * x.end_speed_rpm))]
+                    f"to start from some angles{why}", *start_ways(d, lambda x: x.follows and x.trial.swing_rpm < start.CALMER_SHARE * x.end_speed_rpm))]
 
 
-SURELY_CALM = 0.8
-"""Of the swing that is loud: other current loops, which a change brings with it, may leave more."""
 TRIED_SHARES = (0.8, 0.6, 0.4, 0.2, 0.1)
 """Of a load, from the least change on."""
 TRIED_FACTORS = (1.15, 1.3, 1.6, 2.0)
 CHOKE_FACTORS = (1.5, 2.0, 3.0, 4.0, 5.0, 6.0)
-START_NAMES = ("LOCK_TIME", "Q_CURRENT_REF_OPENLOOP", "OPENLOOP_RAMPSPEED_INCREASERATE", "END_SPEED_RPM")
 TRIED_FRICTION = (0.01, 0.02, 0.04, 0.08)
 """Of the rated torque."""
 
@@ -381,7 +378,7 @@ def start_ways(d: Design, good: Callable[[start.StartDesign], bool]) -> list[str
     def tried(values: list[float], changed: Callable[[float], Motor], maximum_a: Callable[[float], float] = lambda _: most) -> float | None:
         return next((value for value in values if good(d.start_of(changed(value), maximum_a(value)))), None)
 
-    ways = [f"remove {name} from [tune]" for name in START_NAMES if name in m.tune
+    ways = [f"remove {name} from [tune]" for name in start.NAMES if name in m.tune
             and good(d.start_of(replace(m, tune={key: value for key, value in m.tune.items() if key != name}), most))]
     if m.coulomb_nm == 0.0:
         found = tried([limits.digits_up(share * m.rated_torque_nm, 2) for share in TRIED_FRICTION], lambda value: replace(m, coulomb_nm=value))

@@ -58,7 +58,10 @@ LOUD_SHARE = 0.1
 """Share beyond which starts fail from some angles."""
 
 
+NAMES = ("LOCK_TIME", "Q_CURRENT_REF_OPENLOOP", "OPENLOOP_RAMPSPEED_INCREASERATE", "END_SPEED_RPM")
+"""What a start is made of; a motor file's [tune] may fix each."""
 CALMER_SHARE = 0.8 * LOUD_SHARE
+"""A swing that is surely calm: other current loops, which a change brings with it, may leave more."""
 CALMER_CURRENTS, CALMER_ENDS, CALMEST_END_SHARE = (1.0, 0.85, 0.7), (1.15, 1.3, 1.45), 0.75
 """Where the lock cannot be long enough: less current swings less, and at a higher speed the same swing matters less. Shares of the rules' values; the speed
 at the end is at most so much of the nominal one."""
@@ -235,7 +238,7 @@ def design_start(motor: Motor, board: BoardFile, plant: Plant, gains: Gains, max
     current = fixed.get("Q_CURRENT_REF_OPENLOOP") or start_current(motor, maximum_a, trip_a, first)
     end = fixed.get("END_SPEED_RPM") or end_speed(motor, board, current, nominal_rpm)
     design = _timed(motor, board, plant, gains, current, end, fixed)
-    if not design.loud or {"LOCK_TIME", "Q_CURRENT_REF_OPENLOOP", "OPENLOOP_RAMPSPEED_INCREASERATE", "END_SPEED_RPM"} & set(fixed):
+    if not design.loud or set(NAMES) & set(fixed):
         return design
     others = (_timed(motor, board, plant, gains, float(f"{share * current:.3g}"), digits_up(factor * end, 2), fixed)
               for share in CALMER_CURRENTS if share * current >= design.needed_nm / (motor.kt_nm_per_a * LOAD_ANGLE_SINE)
