@@ -146,6 +146,7 @@
 #define PARAM_FLUX_MOST 1.25        /* [1] true flux over the header's: 1.2, and what dead time leaves | robust */
 #define ID_OFF_NOISE 0.03125        /* [1] of the largest current: noise in the d current's mean deviation | campaign */
 #define ID_OFF_DEAD 0.2             /* [1] of dead time's voltage, which drives the d current against its controller | campaign */
+#define ID_OFF_RIPPLE 0.65          /* [1] or of the half ripple, up to which a compensation drives a current that loses nothing | anymotor CASE=235 */
 #define OVERSPEED_SHARE 1.25        /* [1] of the maximum speed: the lock is lost above | run SCENARIO=fault_lost_lock */
 #define PARAM_STALL_SEC 0.23        /* [s] below half the reference; until a standing rotor shows takes up to 0.08 s more | run SCENARIO=fault_stall_running */
 #define STALL_FALL 4u               /* [steps] that a fast one takes back | run SCENARIO=fault_stall_running */

@@ -335,7 +335,7 @@ def test_a_sweep_whose_table_counts_what_holds_is_a_result_with_rows_that_do_not
     monkeypatch.setenv("PYTHONPATH", str(paths.ROOT))
     readme.make("pulse", counts=True)
     assert "43 of 90 expectations hold" in capsys.readouterr().out
-    (tmp_path / "Makefile").write_text("soak:\n\t@echo '3 of 5 segments without a fault'; exit 1\n" + (tmp_path / "Makefile").read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "Makefile").write_text("soak:\n\t@echo '3 of 5 segments are well'; exit 1\n" + (tmp_path / "Makefile").read_text(encoding="utf-8"), encoding="utf-8")
     readme.make("soak", counts=True)
     with pytest.raises(UserError, match="got swing"):
         readme.make("pulse")

@@ -93,9 +93,9 @@ def test_nothing_changes_in_a_stretch_that_is_judged(benches):
 
 
 # ---- what counts as wrong --------------------------------------------------------------------------------------------------
-def found(rests, **signals):
-    recorded = trace(2.0, **{"plant__speed_rpm": 1000.0, "fw__state": 5.0, "pwm__outputs_seen": 63.0} | signals)
-    segment = soak.Segment(1, HURST, "", None, rests)
+def found(rests, held=(), **signals):
+    recorded = trace(2.0, **{"plant__speed_rpm": 1000.0, "fw__speed_ref_rpm": 1000.0, "fw__state": 5.0, "pwm__outputs_seen": 63.0} | signals)
+    segment = soak.Segment(1, HURST, "", None, rests, held=list(held))
     return soak.row_of(segment, Run(None, recorded, states=STATES, faults=FAULTS, motor_s=2.0), 2800.0)
 
 
@@ -126,12 +126,28 @@ def test_a_lost_lock_is_an_angle_that_stays_off_in_closed_loop():
     assert found(REST, fw__theta_est_deg=off(0.06), fw__state=4.0)["verdict"] == soak.OK
 
 
+def test_a_rotor_that_a_hand_holds_shows_no_angle_and_may_stop_the_drive_by_name():
+    hand = [(1.1, 1.5)]
+    off = {"fw__theta_est_deg": lambda time_s: np.where((time_s > 1.2) & (time_s < 1.45), 90.0, 0.0)}
+    assert found([], hand, **off)["verdict"] == soak.OK and "loses its lock" in found([], [(1.3, 1.5)], **off)["verdict"]
+    trip = {"fw__fault": lambda time_s: np.where(time_s > 1.2, 6.0, 0.0)}
+    assert found([], hand, **trip)["verdict"] == "stopped by a hand: STALL at 1.200 s" and found([], [(1.0, 1.1)], **trip)["verdict"].startswith("trips")
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_rotor_that_is_thrown_backwards_as_the_hand_lets_go_is_wrong(direction):
+    def held(back_rpm):
+        return found([], [(1.1, 1.5)], fw__speed_ref_rpm=1000.0 * direction, plant__speed_rpm=lambda time_s: direction * np.where(abs(time_s - 1.3) < 0.01, -back_rpm, 900.0))
+
+    assert held(111.0)["verdict"] == soak.OK and held(113.0)["verdict"] == "thrown backwards: 113 rpm after 1.100 s" # 4 % of 2800 rpm
+
+
 def test_segments_that_fail_with_a_held_shaft_are_counted_apart(benches):
-    rows = [found(REST) | {"holds": holds, "verdict": verdict} for holds, verdict in ((0, "ok"), (2, "ok"), (1, "trips: STALL"), (0, "trips: STALL"), (1, "ok"))]
+    rows = [found(REST) | {"holds": holds, "verdict": verdict} for holds, verdict in ((0, "ok"), (2, "ok"), (1, "trips: STALL"), (0, "trips: STALL"), (1, "stopped by a hand: STALL"))]
     series = soak.Soak(1, benches)
     told = series.page(rows)[0]
     assert (told["wrong"], told["held"], told["wrong_held"], told["passed"]) == (2, 3, 1, False)
-    assert series.text(rows).endswith("2 wrong, 1 of them with a held shaft\n3 of 5 segments without a fault")
+    assert series.text(rows).endswith("2 wrong, 1 of them with a held shaft, 1 stopped by a hand\n3 of 5 segments are well")
 
 
 # ---- the command -------------------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from tools.common.trace import wrapped_deg
 
 from . import command_common, draws, injection, judge, page, reach, simulate
 from .board import Board
+from .held_sweep import Table as HeldTable
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, decel_rpm_s, param, start_time_s
 from .trial import Bench, coast_s
@@ -39,6 +40,8 @@ SAGS, WARM_R, WARM_PSI, TRUE_L = (0.87, 1.0), (0.7, 1.4), (0.8, 1.2), (0.75, 1.2
 """What the supply may sag to, and what the true motor may be of its header's: a wrong header, and temperature."""
 HOLD_S, HOLD_TORQUES = (0.01, 0.1), (1.3, 3.0)
 """How long a hand holds the shaft, and how hard: times the most torque that the drive has."""
+HELD = HeldTable.read(paths.TABLES / "held.toml")
+"""What `make held` asks: how far backwards, and how soon a drive that does not go on has stopped. A rotor that stands shows no angle."""
 MIDDLE = 0.05
 """Of the potentiometer's travel on each side: where the middle chooses no direction, and no speed."""
 VOLTAGE_SHARE, CURRENT_SHARE = 0.8, 0.8
@@ -51,7 +54,7 @@ MODES = ("", "", BIDIRECTIONAL)
 """One of these in a segment."""
 MOST_HOURS = 10000.0
 WHERE = "soak"
-OK = "ok"
+OK, STOPPED = "ok", "stopped by a hand"
 
 
 @dataclass
@@ -64,8 +67,12 @@ class Segment:
     scenario: Scenario
     rests: list[tuple[float, float, float]] = field(default_factory=list)
     starts: int = 1
-    holds: int = 0
-    """how often a hand holds the shaft"""
+    held: list[tuple[float, float]] = field(default_factory=list)
+    """from when a hand holds the shaft until the rotor must be known again"""
+
+    @property
+    def holds(self) -> int:
+        return len(self.held)
 
 
 @dataclass
@@ -110,13 +117,13 @@ class Soak(draws.Series):
         bench, found = self.benches[item.motor, item.mode], run(item, self.benches, lambda seconds: None)
         row = self._row(item, found)
         text = f"{draws.reported(found, bench, folder)}\n\nsegment {item.number}, {item.motor}, header of {paths.shown(bench.motor.path)}: {row['verdict']}"
-        return {"title": item.scenario.title, "passed": row["verdict"] == OK, "row": row}, text
+        return {"title": item.scenario.title, "passed": not self.is_bad(row), "row": row}, text
 
     def curves(self, item: Segment) -> Run:
         return run(item, self.benches, lambda seconds: None)
 
     def is_bad(self, row: dict[str, Any]) -> bool:
-        return row["verdict"] != OK
+        return row["verdict"] != OK and not row["verdict"].startswith(STOPPED)
 
     def line(self, row: dict[str, Any]) -> str:
         return f"segment {row['segment']}, {row['motor']}{', ' + row['mode'] if row['mode'] else ''}: {row['verdict']}"
@@ -126,14 +133,15 @@ class Soak(draws.Series):
         lines = []
         for name in sorted({row["motor"] for row in rows}):
             own = [row for row in rows if row["motor"] == name]
+            stopped = sum(row["verdict"].startswith(STOPPED) for row in own)
             lines.append(f"{name:28} {sum(row['motor_s'] for row in own) / 3600.0:8.3f} h {sum(row['starts'] for row in own):6d} starts "
                          f"{sum(row['stretches'] for row in own):6d} stretches, worst speed error {max(row['worst_speed_error_percent'] for row in own):.2f} %, "
-                         f"{sum(map(self.is_bad, own))} wrong, {sum(self.is_bad(row) for row in own if row['holds'])} of them with a held shaft")
+                         f"{sum(map(self.is_bad, own))} wrong, {sum(self.is_bad(row) for row in own if row['holds'])} of them with a held shaft, {stopped} {STOPPED}")
         return "\n".join([*lines, self._in_short(rows)])
 
     def _in_short(self, rows: list[dict[str, Any]]) -> str:
         """How many end well: the last line of the text, the headline of the page."""
-        return f"{len(rows) - sum(map(self.is_bad, rows))} of {len(rows)} segments without a fault"
+        return f"{len(rows) - sum(map(self.is_bad, rows))} of {len(rows)} segments are well"
 
     def worst(self, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         return sorted(rows, key=lambda row: (not self.is_bad(row), 0.0 if self.is_bad(row) else -row["worst_speed_error_percent"]))[:12]
@@ -179,7 +187,8 @@ class _Drawing:
         self.settle_s = max(8.0 / param(self.params, "SPEED_BANDWIDTH_HZ"), 0.7)
         self.events: list[Event] = []
         self.rests: list[tuple[float, float, float]] = []
-        self.rpm, self.load_nm, self.starts, self.holds, self.now_s, self.true_l = 0.0, 0.0, 0, 0, 0.2, r.uniform(*TRUE_L)
+        self.held: list[tuple[float, float]] = []
+        self.rpm, self.load_nm, self.starts, self.now_s, self.true_l = 0.0, 0.0, 0, 0.2, r.uniform(*TRUE_L)
 
     def segment(self) -> Segment:
         values = {"rng.seed": float(self.r.randrange(1, 2**31)), "adc.noise_lsb": self.r.uniform(0.3, 1.5),
@@ -194,7 +203,7 @@ class _Drawing:
         scenario = Scenario(f"segment {self.number}", f"{self.name} {self.mode}".strip(), "", "", "", round(self.now_s, 3), defines=[self.mode] if self.mode else [],
                             events=sorted(self.events, key=lambda event: event.at_s), rotor_deg=float(self.r.randrange(360)),
                             plant=Values(values, {key: WHERE for key in values}))
-        return Segment(self.number, self.name, self.mode, scenario, self.rests, self.starts, self.holds)
+        return Segment(self.number, self.name, self.mode, scenario, self.rests, self.starts, self.held)
 
     def _warm(self) -> list[tuple[str, float, tuple[float, float]]]:
         return [("motor.rs_ohm", float(self.plant["motor.rs_ohm"]), WARM_R), ("motor.psi_vs", float(self.plant["motor.psi_vs"]), WARM_PSI)]
@@ -304,11 +313,12 @@ class _Drawing:
 
     def _held(self) -> None:
         """A hand on the shaft, harder than the drive, and off again."""
-        self.holds += 1
+        from_s = self.now_s
         most_nm = param(self.params, "MAXIMUM_CURRENT_A") * reach.torque_per_amp(self.plant)
         self._set({BRAKE: self.load_nm + self.r.uniform(*HOLD_TORQUES) * most_nm}, 0.002)
         self.now_s += self.r.uniform(*HOLD_S)
         self._set({BRAKE: self.load_nm})
+        self.held.append((from_s, self.now_s + HELD.stop_s))
         self._rest(abs(self.rpm), self._back_s(most_nm))
 
     def _back_s(self, most_nm: float) -> float:
@@ -341,16 +351,19 @@ def row_of(segment: Segment, found: Run, rated_rpm: float) -> dict[str, Any]:
     """The segment's line: what was worst, and the first thing that is wrong."""
     trace = found.trace
     errors = [error for rest in segment.rests if (error := _speed_error(trace, rest, rated_rpm)) is not None]
-    angle_deg = _angle_error_deg(found)
+    angle_deg = _angle_error_deg(found, segment.held)
     return {"segment": segment.number, "motor": segment.motor, "mode": segment.mode, "motor_s": round(found.motor_s, 2), "starts": segment.starts,
             "holds": segment.holds, "stretches": len(errors), "worst_speed_error_percent": round(max((abs(error) for _, error, _ in errors), default=0.0), 3),
-            "worst_angle_error_deg": round(angle_deg, 1), "verdict": verdict(found, errors, angle_deg)}
+            "worst_angle_error_deg": round(angle_deg, 1), "verdict": verdict(found, segment, errors, angle_deg, max(HELD.back_rpm, HELD.back_percent / 100.0 * rated_rpm))}
 
 
-def verdict(run: Run, errors: list[tuple[float, float, float]], angle_deg: float) -> str:
-    """The first thing that is wrong; OK if nothing is."""
+def verdict(run: Run, segment: Segment, errors: list[tuple[float, float, float]], angle_deg: float, most_back_rpm: float) -> str:
+    """The first thing that is wrong; OK if nothing is, STOPPED if a hand on the shaft did it."""
+    for from_s, to_s in segment.held:
+        if (back_rpm := _backwards_rpm(run.trace.part(from_s, to_s))) > most_back_rpm:
+            return f"thrown backwards: {back_rpm:.0f} rpm after {from_s:.3f} s"
     for _, at_s, name in run.raised():
-        return f"trips: {name} at {at_s:.3f} s"
+        return f"{STOPPED if any(from_s <= at_s <= to_s for from_s, to_s in segment.held) else 'trips'}: {name} at {at_s:.3f} s"
     for at_s, error_percent, allowed_percent in errors:
         if abs(error_percent) > allowed_percent:
             return f"speed {error_percent:+.2f} % off at {at_s:.2f} s, allowed {allowed_percent:.2f} %"
@@ -369,11 +382,21 @@ def _speed_error(trace: Any, rest: tuple[float, float, float], rated_rpm: float)
     return from_s, 100.0 * (mean_rpm - rpm) / abs(rpm), 100.0 * allowed_rpm / abs(rpm)
 
 
-def _angle_error_deg(run: Run) -> float:
-    """The largest error that lasts for LOST_LOCK_S in closed loop; the sign may change."""
+def _backwards_rpm(part: Any) -> float:
+    """How fast the rotor turns against the reference."""
+    if not len(part):
+        return 0.0
+    forward = np.sign(part.column("fw.speed_ref_rpm"))
+    return float(np.max(-forward * part.column("plant.speed_rpm")))
+
+
+def _angle_error_deg(run: Run, held: list[tuple[float, float]]) -> float:
+    """The largest error that lasts for LOST_LOCK_S in closed loop, but for a rotor that a hand holds; the sign may change."""
     trace = run.trace
     closed = (trace.column("fw.state") == run.state_number("CLOSED")) | (trace.column("fw.state") == run.state_number("STOPPING"))
     error = np.where(closed, np.abs(wrapped_deg(trace.column("fw.theta_est_deg") - trace.column("plant.theta_e_deg"))), 0.0)
+    for from_s, to_s in held:
+        error[(trace.time_s >= from_s) & (trace.time_s < to_s)] = 0.0
     rows = max(1, round(LOST_LOCK_S / max(trace.period_s, 1e-6)))
     if len(error) < rows:
         return 0.0

@@ -204,7 +204,7 @@ def make(command: str, counts: bool = False) -> None:
     done = subprocess.run([sys.executable, "-m", "tools.common.progress", f"make {command}", *quietly], cwd=ROOT, env=environment, check=False)
     if done.returncode:
         told = log.read_text(encoding="utf-8", errors="replace").strip().splitlines() or [f"exit status {done.returncode}"]
-        held = [line for line in told if counts and re.fullmatch(r"\d+ of \d+ (expectations hold|segments without a fault)", line)]
+        held = [line for line in told if counts and re.fullmatch(r"\d+ of \d+ (expectations hold|segments are well)", line)]
         if held:
             print(f"    {held[-1]}", flush=True)
             return
