@@ -117,6 +117,14 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
     return (uint16_t)!observer_gate_is_closed(&run->observer); /* a load slows it down that the observer knows */
 }
 
+/** The same lead, or a little more or less: a phase whose current is near zero hides what turns across it in dead time. The q current's is at each sixth turn. */
+QM_WRAPS static int16_t held_clear_of_zero(const drive_t *d, int16_t lead)
+{
+    const int16_t sixth = (int16_t)(6u * (uint16_t)(d->run.estimator.next - (angle_t)lead));
+    const uint16_t clear = (uint16_t)((sixth < 0) ? HELD_CLEAR_ANGLE : -HELD_CLEAR_ANGLE);
+    return qm_beyond(sixth, 6 * HELD_CLEAR_ANGLE) ? lead : (int16_t)(uint16_t)((uint16_t)lead + clear);
+}
+
 /** The angle stops where a rotor would be that stopped at once. */
 static void held_stop_angle(drive_t *d, const drive_params_t *p)
 {
@@ -129,7 +137,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     turns_far = (uint16_t)(qm_beyond(lead, HELD_FAR_LEAD) || qm_beyond(d->run.control.ref_q13.d, (int16_t)(p->current_max_q13 >> HELD_FAR_SHIFT)));
     shaft->patience = turns_far ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
     shaft->turned_q12 = 0;
-    held_turn_back(d, p, lead);
+    held_turn_back(d, p, held_clear_of_zero(d, lead));
     held_enter(shaft, HELD_SETTLES);
     d->run.model.inv_kfi = 0;
     d->run.observer.omega_q16 = 0;

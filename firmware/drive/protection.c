@@ -89,7 +89,7 @@ current_q13_t protection_probe_most(const drive_run_t *run, const drive_params_t
 
 speed_erpm_t protection_least_speed(const drive_run_t *run, const drive_params_t *p)
 {
-    int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> 1), standing = (int16_t)(p->minimum_erpm >> 1);
+    int16_t least = (int16_t)(qm_abs(run->control.reference_erpm) >> STALL_SLOW_SHIFT), standing = (int16_t)(p->minimum_erpm >> STALL_SLOW_SHIFT);
     return (least < standing) ? standing : least;
 }
 
@@ -177,9 +177,11 @@ void protection_probe_rotor(drive_t *d, const drive_params_t *p)
 void protection_check_rotor(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
-    int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_abs(along), standing = (int16_t)(p->minimum_erpm >> 1);
+    int16_t along = along_direction(d, estimator_speed(&run->estimator)), speed = qm_abs(along), standing = (int16_t)(p->minimum_erpm >> STALL_SLOW_SHIFT);
     dq_t emf = estimator_emf(&run->estimator);
-    if (along < protection_least_speed(run, p)) {
+    speed_erpm_t least = protection_least_speed(run, p);
+    least = qm_beyond(run->control.ref_q13.q, (int16_t)(p->current_max_q13 >> STALL_ASKS_SHIFT)) ? least : (int16_t)(least >> 1); /* with little it is on its way */
+    if (along < least) {
         run->stall_steps++;
     } else { /* of a rotor that only jerks the estimate is fast now and then */
         run->stall_steps = (uint16_t)((run->stall_steps > STALL_FALL) ? run->stall_steps - STALL_FALL : 0u);

@@ -66,7 +66,7 @@ static void signals_gather_beats(signals_evidence_t *e, const drive_t *d, int16_
 {
     const sincos_t at = d->frame;
     sincos_t double_angle;
-    if (qm_beyond(d->run.control.reference_erpm >> SIGNALS_STANDS_SHIFT, qm_abs(observer_speed(&d->run.observer)))) {
+    if (qm_beyond(d->run.control.reference_erpm >> SIGNALS_STANDS_SHIFT, qm_abs(estimator_speed(&d->run.estimator)))) {
         return;
     }
     double_angle.cos = (int16_t)(qm_mulhi(at.cos, at.cos) - qm_mulhi(at.sin, at.sin)); /* half */

@@ -128,6 +128,7 @@
 #define HELD_LAG_SHIFT 2      /* [shift] of what the back-EMF's filter is behind 1/4 is forgotten a step, before a rotor is doubted | held */
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
 #define HELD_FAR_SHIFT 3         /* [shift] and 1/8 of the largest current as d current, which goes as the angle stops | soak */
+#define HELD_CLEAR_ANGLE 1024 /* [2^-16 turn] 5.6 degrees: so far from a phase's zero crossing the angle stands | held */
 #define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
 #define HELD_TURNED_RAD 0.175 /* [rad] ten degrees, electrical, by what its back-EMF gained: so far no shaft that is held goes | loadsteps */
 #define HELD_PULL_ANGLE 182   /* [2^-16 turn] a degree a step, by which all of the current pulls a rotor that stands | loadsteps */
@@ -146,10 +147,12 @@
 #define PARAM_FLUX_MOST 1.25        /* [1] true flux over the header's: 1.2, and what dead time leaves | robust */
 #define ID_OFF_NOISE 0.03125        /* [1] of the largest current: noise in the d current's mean deviation | campaign */
 #define ID_OFF_DEAD 0.2             /* [1] of dead time's voltage, which drives the d current against its controller | campaign */
-#define ID_OFF_RIPPLE 0.65          /* [1] or of the half ripple, up to which a compensation drives a current that loses nothing | anymotor CASE=235 */
+#define ID_OFF_RIPPLE 0.65          /* [1] or of the half ripple, up to which a compensation drives a current that loses nothing | anymotor */
 #define OVERSPEED_SHARE 1.25        /* [1] of the maximum speed: the lock is lost above | run SCENARIO=fault_lost_lock */
 #define PARAM_STALL_SEC 0.23        /* [s] below half the reference; until a standing rotor shows takes up to 0.08 s more | run SCENARIO=fault_stall_running */
+#define STALL_SLOW_SHIFT 1              /* [shift] below half of the reference, or of the minimum speed, a rotor may have stalled | run SCENARIO=fault_stall_running */
 #define STALL_FALL 4u               /* [steps] that a fast one takes back | run SCENARIO=fault_stall_running */
+#define STALL_ASKS_SHIFT 1              /* [shift] of the largest current: above a quarter of the reference a stalled rotor is asked for more | held MOTOR=ipm_4pp_24v_2000 */
 #define LOST_LOCK_SEC 0.06          /* [s] Ed above Eq | run SCENARIO=fault_lost_lock */
 #define WRONG_SEC 0.1               /* [s] of innovations that no load explains | run SCENARIO=fault_open_phase */
 #define IMPOSSIBLE_SEC 0.25         /* [s] of a flux or resistance that cannot be | campaign */

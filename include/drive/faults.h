@@ -28,7 +28,7 @@
       "at the end of the ramp the estimator did not see the ramp's speed: shaft blocked or load too high", \
       "free the shaft; raise Q_CURRENT_REF_OPENLOOP or LOCK_TIME, lower OPENLOOP_RAMPSPEED_INCREASERATE") \
     X(6, STALL, FAULT_PASSES, "protection_check_rotor", \
-      "the estimated speed stayed below half the reference, or backwards; or a probe found the rotor standing", \
+      "the estimated speed stayed below half the reference, with little current below a quarter, or backwards; or a probe found the rotor standing", \
       "remove the overload; in field weakening see FdWeakParm.qIndex and raise that IDREF_SPEED entry") \
     X(7, LOST_LOCK, FAULT_PASSES, "protection_check_rotor", \
       "the estimator's d-axis back-EMF exceeded the q-axis one, or its speed left the possible range", \

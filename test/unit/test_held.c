@@ -168,6 +168,25 @@ void test_a_back_emf_that_is_lost_at_once_turns_the_frame_back_by_its_lag_and_th
     }
 }
 
+void test_the_angle_stands_where_each_phase_carries_a_current_that_does_not_hide_in_dead_time(void)
+{
+    EACH_DIRECTION(direction) {
+        uint32_t angle;
+        for (angle = 0; angle < 65536u; angle += 331u) {
+            int16_t moved, from_zero;
+            at(direction, FAST_ERPM, 100, 0, 0);
+            drive.run.estimator.next = (angle_t)angle;
+            steps(2);
+            TEST_ASSERT_TRUE(held_angle_stands(shaft));
+            moved = (int16_t)(angle_t)(drive.run.estimator.next - angle);
+            from_zero = (int16_t)((drive.run.estimator.next + 5461u) % 10923u) - 5461;
+            TEST_ASSERT_INT16_WITHIN(HELD_CLEAR_ANGLE + 1, 0, moved);
+            TEST_ASSERT_GREATER_OR_EQUAL_INT16(HELD_CLEAR_ANGLE - 7, qm_abs(from_zero));
+            TEST_ASSERT_EQUAL_INT16((qm_abs((int16_t)((angle + 5461u) % 10923u) - 5461) > HELD_CLEAR_ANGLE + 6) ? 0 : HELD_CLEAR_ANGLE, qm_abs(moved));
+        }
+    }
+}
+
 void test_what_the_estimator_took_back_by_itself_is_no_lag(void)
 {
     const int16_t k_q16 = drive.run.model.kfilter_esdq_q16;

@@ -172,6 +172,7 @@ void test_stall_and_lost_lock_are_faults_when_they_last(void)
     EACH(n, cases) {
         uint16_t steps = 0, fault;
         rig_closed((int16_t)((cases[n].reference_erpm < 0) ? -1 : 1), cases[n].reference_erpm);
+        drive.run.control.ref_q13.q = (int16_t)((params.current_max_q13 >> STALL_ASKS_SHIFT) + 1);
         rig_speed(cases[n].speed_erpm);
         drive.run.estimator.e_d_q28 = (int32_t)cases[n].e_d * 65536;
         drive.run.estimator.e_q_q28 = (int32_t)cases[n].e_q * 65536;
@@ -182,6 +183,36 @@ void test_stall_and_lost_lock_are_faults_when_they_last(void)
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].steps, steps, cases[n].what);
         fault = (uint16_t)((steps == (uint16_t)STALL) ? FAULT_STALL : (steps == (uint16_t)LOST_LOCK) ? FAULT_LOST_LOCK : FAULT_NONE);
         TEST_ASSERT_EQUAL_UINT16_MESSAGE(fault, drive.fault, cases[n].what);
+    }
+}
+
+void test_rotor_that_turns_at_more_than_a_quarter_of_the_reference_with_little_current_is_on_its_way(void)
+{
+    static const struct {
+        const char *what;
+        int16_t reference_erpm, speed_erpm, more_q13;
+        uint16_t fault;
+    } cases[] = {
+        { "half of the current", 10000, 2500, 0, FAULT_NONE },
+        { "more of it", 10000, 2500, 1, FAULT_STALL },
+        { "a quarter of the reference", 10000, 2499, 0, FAULT_STALL },
+        { "the other way round", -10000, -2500, 0, FAULT_NONE },
+        { "more of it, the other way round", -10000, -2500, 1, FAULT_STALL },
+        { "a quarter of the minimum speed", 2000, 625, 0, FAULT_NONE },
+        { "less", 2000, 624, 0, FAULT_STALL },
+        { "backwards", 10000, -2500, 0, FAULT_STALL },
+    };
+    EACH(n, cases) {
+        const int16_t direction = (int16_t)((cases[n].reference_erpm < 0) ? -1 : 1);
+        uint16_t count;
+        rig_closed(direction, cases[n].reference_erpm);
+        drive.run.control.ref_q13.q = (int16_t)(direction * ((params.current_max_q13 >> STALL_ASKS_SHIFT) + cases[n].more_q13));
+        rig_speed(cases[n].speed_erpm);
+        drive.run.estimator.e_q_q28 = 100L * 65536;
+        for (count = 0; count < 2u * params.stall_steps && drive.state == (uint16_t)DRIVE_CLOSED; count++) {
+            protection_check_rotor(&drive, &params);
+        }
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].fault, drive.fault, cases[n].what);
     }
 }
 
