@@ -122,7 +122,7 @@ help: ## [upkeep] this list
 
 # ---- runs ----------------------------------------------------------------------------------------------------------------
 # The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
-alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR -u USERPARAMS -u DEFINES
+alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR -u USERPARAMS -u DEFINES ASKED_BY=make
 python = "$$(cat build/setup/python)"
 # Says now and then that a silent command still runs: $(still) title command
 still = python3 -m tools.common.progress

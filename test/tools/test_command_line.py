@@ -8,6 +8,7 @@ import pytest
 from support import refused
 
 from tools.common import command_line
+from tools.common.errors import UserError
 
 
 @pytest.fixture
@@ -28,6 +29,18 @@ def test_a_command_gets_the_files_that_it_asks_for(called):
 @pytest.mark.parametrize("arguments", [(), ("one",), ("one", "two", "three")])
 def test_too_few_or_too_many_files_are_one_line(called, arguments):
     refused(called(lambda *files: None, *arguments), f"{len(arguments)} files instead of 2, tools.name: name an image and the file to write")
+
+
+@pytest.mark.parametrize("line, by_make", [
+    ("no motor 'x', --motor: use one of a, b", "no motor 'x', MOTOR: use one of a, b"),
+    ("argument --count: invalid int value: 'many', command line: see tuning any --help",
+     "argument N: invalid int value: 'many', command line: make help tells what it takes"),
+    ("write --all, not --outer or a--out", "write --all, not --outer or a--out")])
+def test_a_line_names_the_variables_of_make_where_make_was_called(line, by_make, monkeypatch, capsys):
+    for asked, told in (("make", by_make), ("", line)):
+        monkeypatch.setenv("ASKED_BY", asked)
+        command_line.tell(None, UserError(line))
+        assert capsys.readouterr().err == f"foc33: {told}\n"
 
 
 @pytest.mark.parametrize("module, files", [("tools.live.chip_types", 1), ("tools.live.plain_elf", 2), ("tools.image.load", 1)])

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -19,10 +20,22 @@ class Parser(argparse.ArgumentParser):
         raise UserError(message, "command line", f"see {self.prog} --help")
 
 
+BY_MAKE = {name: name.upper() for name in ("board", "case", "defines", "draw", "hours", "image", "kind", "motor", "out", "seed", "set", "userparams")} | {"count": "N"}
+"""Options as make has them."""
+
+
+def as_asked(line: str) -> str:
+    """A line for whoever has called make, and knows of no options."""
+    if os.environ.get("ASKED_BY") != "make":
+        return line
+    line = re.sub(r"see [\w. ]+ --help$", "make help tells what it takes", line)
+    return re.sub(r"(?<![\w-])--([a-z]+)(?![\w-])", lambda option: BY_MAKE.get(option[1], option[0]), line)
+
+
 def tell(_: object, error: UserError) -> None:
     """The lines of a refused item, on standard error."""
     for line in error.lines:
-        print(f"foc33: {line}", file=sys.stderr, flush=True)
+        print(f"foc33: {as_asked(line)}", file=sys.stderr, flush=True)
 
 
 def each(items: Iterable[Item], work: Callable[[Item], Made], refuse: Callable[[Item, UserError], None] = tell) -> tuple[list[Made], int]:
