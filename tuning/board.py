@@ -55,7 +55,8 @@ def command(options: argparse.Namespace) -> int:
     try:
         path.write_text(made, encoding="utf-8")
     except OSError as error:
-        raise UserError(f"cannot write the file ({error.strerror})", label, "choose a folder that can be written") from None
+        remedy = "choose a folder that can be written" if path.parent.is_dir() else f"make the folder {paths.shown(path.parent)} first"
+        raise UserError(f"cannot write the file ({error.strerror})", label, remedy) from None
     print(f"wrote {label}; numbers that nobody gave are those of the board that it began as: look through it\n\n{text(board)}")
     return 0
 

@@ -8,7 +8,7 @@ import argparse
 import contextlib
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -108,7 +108,7 @@ def command(options: argparse.Namespace) -> int:
     base = board_file.load(options.board or board_file.DEFAULT, "BOARD")
     found = an1292.read(c_header.read(Path(options.header), defines(options.defines)), _supply_v(told, base), base.dead_time_s, told.divisors)
     with waiting(f"tuning {name}"):
-        plan = planned(name, found, base, told)
+        plan = planned(name, found, base, told, _doubts)
     with _written(plan):
         plan.design = _designed(plan, fresh=True)
         target = paths.TUNED / paths.pair_name(plan.motor_path, None)
@@ -118,6 +118,12 @@ def command(options: argparse.Namespace) -> int:
     print(report.brief(plan.design))
     print(f"next: make run MOTOR={name}; make tune MOTOR={name} makes userparams.h anew after a change of the motor file")
     return 0
+
+
+def _doubts(plan: Plan) -> None:
+    """What was taken for more than the header says, where the tuner refuses what came of it."""
+    if doubtful := [*plan.found.contradictions, *plan.found.notes]:
+        print("\n  ".join([f"{plan.found.header.label}: look at", *doubtful]))
 
 
 # ---- what is given -----------------------------------------------------------------------------------------------------------
@@ -175,10 +181,14 @@ def _supply_v(told: Given, base: BoardFile) -> float:
 
 
 # ---- the plan ----------------------------------------------------------------------------------------------------------------
-def planned(name: str, found: UserParms, base: BoardFile, told: Given) -> Plan:
-    """What is going to be written; refuses what could not be used, and files that are there."""
+def planned(name: str, found: UserParms, base: BoardFile, told: Given, refused: Callable[[Plan], object] = lambda plan: None) -> Plan:
+    """What is going to be written; refuses what could not be used, and files that are there. `refused` is told of a plan that the tuner refuses."""
     plan = prepared(name, found, base, told)
-    plan.design = _settled(plan, told)
+    try:
+        plan.design = _settled(plan, told)
+    except UserError:
+        refused(plan)
+        raise
     plan.tables = _tables(plan, told)
     return plan
 

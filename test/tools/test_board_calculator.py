@@ -118,7 +118,7 @@ def test_nonsense_is_one_line_and_writes_nothing(path, words, parts):
 
 
 def test_a_folder_that_is_not_there_is_one_line(tmp_path):
-    refused(command("board", str(tmp_path / "none" / "x.toml"), "gain=20"), "cannot write the file")
+    refused(command("board", str(tmp_path / "none" / "x.toml"), "gain=20"), "cannot write the file", "make the folder", "none first")
 
 
 def test_text_from_the_command_line_cannot_break_the_file(path):

@@ -33,7 +33,7 @@ def test_too_few_or_too_many_files_are_one_line(called, arguments):
 
 @pytest.mark.parametrize("line, by_make", [
     ("no motor 'x', --motor: use one of a, b", "no motor 'x', MOTOR: use one of a, b"),
-    ("argument --count: invalid int value: 'many', command line: see tuning any --help",
+    ("argument --count: invalid int value: 'many', command line: see python3 -m tools.any one --help",
      "argument N: invalid int value: 'many', command line: make help tells what it takes"),
     ("write --all, not --outer or a--out", "write --all, not --outer or a--out")])
 def test_a_line_names_the_variables_of_make_where_make_was_called(line, by_make, monkeypatch, capsys):

@@ -27,6 +27,16 @@ def compiler_free_path(folder: Path, *more: str) -> str:
     return str(folder)
 
 
+def test_the_compiler_s_folder_its_bin_and_its_program_are_the_same_compiler(tmp_path):
+    program = tmp_path / "own tools" / "bin" / "xc16-gcc"
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/bin/sh\n", encoding="utf-8")
+    program.chmod(0o755)
+    for place in (program.parent.parent, program.parent, program):
+        done = make("find-xc16", f"XC16={place}")
+        assert done.returncode == 0, (place, done.stderr)
+
+
 # ---- without the compiler ------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("words, expected", [
     ([], "no xc16-gcc, not on PATH: install Microchip's MPLAB XC16 .*XC16="),

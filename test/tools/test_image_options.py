@@ -37,6 +37,12 @@ def test_an_image_that_does_not_fit_says_by_how_many_bytes_and_what_its_options_
         f"PARAMS_IN_RAM {cost('PARAMS_IN_RAM')}, MOTOR_NTC_USED {cost('MOTOR_NTC_USED')} bytes (docs/results.md, What an option costs)\n")
 
 
+def test_an_option_that_needs_another_is_told_with_what_it_costs_on_top(tmp_path):
+    said = overfull(tmp_path, 34140, "-DPARAMS_IN_RAM -DPARAMS_KEPT=1").stdout
+    both = int(cost("PARAMS_IN_RAM`, `PARAMS_KEPT").lstrip("+"))
+    assert f"of these PARAMS_IN_RAM {cost('PARAMS_IN_RAM')}, PARAMS_KEPT {both - int(cost('PARAMS_IN_RAM'))} bytes" in said
+
+
 @pytest.mark.parametrize("used", [None, 33024])
 def test_what_does_not_link_for_another_reason_is_not_called_too_large(tmp_path, used):
     done = overfull(tmp_path, used)

@@ -179,6 +179,12 @@ def test_a_mistake_of_the_header_is_one_line_and_writes_nothing(project, text, p
     assert project.files() == []
 
 
+def test_what_was_taken_for_more_than_the_header_says_is_told_where_the_tuner_refuses_it(project):
+    code, out, error = project.run(changed(("#define LOCK_TIME", "#define SPEEDREFRAMP_COUNT 3\n#define LOCK_TIME")), "current=90")
+    assert code == 2 and "the rated current needs" in error and "pump.h: look at\n  " in out and "rs_divisor" in out, out + error
+    assert project.files() == []
+
+
 def test_without_a_header_the_command_says_how_to_name_one():
     refused(command("import"), "no header", "make import HEADER=userparms.h")
 

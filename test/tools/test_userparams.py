@@ -277,10 +277,21 @@ def test_poles_in_place_of_pole_pairs_are_told_by_that_name(tmp_path):
         f"foc33: {place(text, 'NOPOLESPAIRS')}: the back-EMF's format overflows: check NOPOLESPAIRS = 10, half the number of poles, or lower "), lines
 
 
-@pytest.mark.parametrize("text, remedy", [("5/2", "5.0/2.0"), ("1.0 * (5/2)", "1.0 * (5.0/2.0)"), ("2.5f*3/(2/1.5) + 7 / 3", "2.5f*3.0/(2.0/1.5) + 7.0 / 3.0")])
+@pytest.mark.parametrize("text, remedy", [("5/2", "5.0/2.0"), ("1.0 * (5/2)", "1.0 * (5.0/2.0)"), ("2.5f/(2/1.5) + 7 / 9", "2.5f/(2.0/1.5) + 7.0 / 9.0")])
 def test_a_quotient_is_told_with_what_to_write(tmp_path, text, remedy):
     code, lines = checked(tmp_path, PC, value("MOTOR_RS_OHM", text))
     assert code == 2 and len(lines) == 1 and lines[0].endswith(f"MOTOR_RS_OHM = {text} divides whole numbers, of which C drops the fraction: write {remedy}")
+
+
+@pytest.mark.parametrize("name, text", [("MAXIMUM_SPEED_RPM", "05500"), ("MAXIMUM_SPEED_RPM", "(11 * 0500)"), ("MOTOR_RS_OHM", "5/2"), ("MOTOR_RS_OHM", "1.0 * (5/2)")])
+def test_a_number_whose_meaning_is_plain_keeps_no_other_mistake_back(tmp_path, name, text):
+    told = lines_of(tmp_path, **{name: text}, INVKFI_SPEED3="19750", KCURRB="0.5")
+    assert set(told) == {name, "INVKFI_SPEED3", "KCURRB"}, told
+
+
+def test_an_entry_computed_from_macros_is_told_in_one_short_line(tmp_path):
+    told = lines_of(tmp_path, INVKFI_SPEED3="NORM_INVKFIBASE*2")
+    assert told == {"INVKFI_SPEED3": "INVKFI_SPEED3 must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that, or make tune-fw"}
 
 
 def test_a_number_that_only_the_build_sees_is_octal_is_told(tmp_path):
@@ -347,6 +358,11 @@ def test_a_constant_of_an1292_beside_the_parameters_names_the_one_that_it_follow
     text = HEADER.replace(RS, RS + f"#define {name} 100\n")
     code, lines = checked(tmp_path, PC, text)
     assert code == 2 and len(lines) == 1 and lines[0].startswith(f"foc33: {place(text, name)}: {name} = 100 is a constant of AN1292's header, here it follows from {follows}: remove it")
+
+
+def test_each_constant_of_an1292_beside_the_parameters_is_told_and_so_are_other_mistakes(tmp_path):
+    told = lines_of(tmp_path, NORM_LSDTBASE="1397", SPEEDREFRAMP="Q15(0.00003)", D_ILIMIT_HS="1447", KCURRB="0.5")
+    assert set(told) == {"NORM_LSDTBASE", "SPEEDREFRAMP", "D_ILIMIT_HS", "KCURRB"} and "follows from MOTOR_LS_MH" in told["NORM_LSDTBASE"]
 
 
 # ---- names ---------------------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ def as_asked(line: str) -> str:
     """A line for whoever has called make, and knows of no options."""
     if os.environ.get("ASKED_BY") != "make":
         return line
-    line = re.sub(r"see [\w. ]+ --help$", "make help tells what it takes", line)
+    line = re.sub(r"see [\w. -]+ --help$", "make help tells what it takes", line)
     return re.sub(r"(?<![\w-])--([a-z]+)(?![\w-])", lambda option: BY_MAKE.get(option[1], option[0]), line)
 
 

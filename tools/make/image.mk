@@ -6,7 +6,10 @@
 OPT ?= -O2
 # XC16, or its successor XC-DSC: its programs have other names, and it need not call itself __XC16__.
 xc16_in = $(shell for name in xc16- xc-dsc-; do command -v $(call quoted,$1)$${name}gcc >/dev/null && echo $$name && break; done)
-# XC16=.../bin is the same compiler.
+# XC16=.../bin and XC16=.../bin/xc16-gcc are the same compiler.
+ifneq ($(filter %xc16-gcc %xc-dsc-gcc,$(XC16)),)
+override XC16 := $(shell dirname $(call quoted,$(XC16)))
+endif
 ifeq ($(if $(XC16),$(call xc16_in,$(XC16)/bin/),on PATH),)
 ifneq ($(call xc16_in,$(XC16)/),)
 override XC16 := $(XC16)/..

@@ -1,9 +1,10 @@
 # The compiler's messages about userparams.h as lines for a user.
 #
-#   awk -F '\t' -v header=FILE -v compiler=NAME -v refused=FILE -v near=FILE -f messages.awk PLACES NEEDS MESSAGES
+#   awk -F '\t' -v header=FILE -v compiler=NAME -v refused=FILE -v near=FILE -v meant=FILE -f messages.awk PLACES NEEDS MESSAGES
 #
 # PLACES: name, file:line, range of each parameter that the header has; NEEDS: a line for each relation, the names that it is computed from;
-# `refused`: what was told so far, to which new names and relations are added; `near`: missing names that were told with a misspelt one.
+# `refused`: what was told so far, to which new names and relations are added; `near`: missing names that were told with a misspelt one;
+# `meant`: names and values that the checks take in place of what was refused, so that nothing follows from that.
 # Exit code: 0 the header's own checks have told what they found, 3 one parameter is no C and hides the others, 2 the header cannot be read.
 
 function place_of(text,   word, count, words, i) {
@@ -53,7 +54,7 @@ function apart(one, other,   a, b) {
 # Whether what a relation says may be the fault of what was told before: a value that it needs, or a relation that one of its own parameters would mend.
 function follows(number,   i, list) {
     for (i in told)
-        if (index(needs[number], " " i " ")) return 1
+        if (!(i in known) && index(needs[number], " " i " ")) return 1
     for (i = 1; i <= relations; i++)
         if ((share(needs[number], names_of[i]) || share(named(relation[number]), needs_of[i])) && !apart(relation[number], text_of[i])) return 1
     return 0
@@ -105,6 +106,14 @@ function joined(text, others,   count, subject, i, list) {
     return list demand(text)
 }
 
+# What a value of whole numbers is meant to be.
+function meaning(text, kind) {
+    sub(/ (is|divides) .*/, "", text)
+    if (kind == "octal") sub(/0+/, "", text)
+    else gsub(/[0-9]+/, "&.0", text)
+    return text
+}
+
 # The line of the header in which a name stands that the compiler has not seen there; 0 if it stands nowhere.
 function unseen(name,   line, number, at) {
     while ((getline line < header) > 0) {
@@ -117,9 +126,12 @@ function unseen(name,   line, number, at) {
 
 BEGIN {
     MOST = 5
+    LONGEST = 120
     while ((getline line < refused) > 0) told[line] = some = 1
     while ((getline line < near) > 0) told[line] = 1
     close(refused)
+    while ((getline line < meant) > 0) known[substr(line, 1, index(line, "\t") - 1)] = 1
+    close(meant)
 }
 FILENAME ~ /places$/ { place[$1] = $2; range[$1] = $3; next }
 FILENAME ~ /needs$/ { needs[count_of_needs++] = " " $0 " "; next }
@@ -133,6 +145,7 @@ match($0, /error: userparams\.h: /) {
     if (match(text, / \.\. [-0-9.]+ 1 \(/)) text = substr(text, 1, RSTART + RLENGTH - 5) " (" substr(text, RSTART + RLENGTH) # of no unit
     first = text
     sub(/ .*/, "", first)
+    if (match(text, /^[A-Z0-9_]+ = .* must /) && RLENGTH > LONGEST) text = first substr(text, RSTART + RLENGTH - 6) # a value of macros, written out
     checked = 1
     if (between) {
         match($0, /relation_[0-9]+/)
@@ -147,6 +160,8 @@ match($0, /error: userparams\.h: /) {
         next
     }
     lines[++count] = "foc33: " (first == name && !(first in place) ? header : place_of(text)) ": " text
+    if (match(text, / = [-+0-9]+ is octal to C/)) print name "\t" meaning(substr(text, RSTART + 3), "octal") >>meant
+    if (match(text, / = [-+0-9\/() ]+ divides whole numbers/)) print name "\t" meaning(substr(text, RSTART + 3), "fraction") >>meant
     names[count] = name
     next
 }

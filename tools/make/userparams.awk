@@ -24,8 +24,10 @@ function plain(text, range) {
     return text
 }
 
-# Names a constant that AN1292's header sets and that follows from another number here.
-function an1292(   count, word, i, name) {
+# Names the constants that AN1292's header sets and that follow from other numbers here. Whether it is a whole header of AN1292: one line is enough then.
+function an1292(   count, word, i, name, whole, lacks) {
+    for (name in ranged) lacks += name in value ? -1 : 1
+    whole = lacks > 0
     count = split(constants, word, " ")
     for (i = 1; i < count; i += 2) {
         name = word[i]
@@ -33,7 +35,7 @@ function an1292(   count, word, i, name) {
         if (name in value && place[name] != option) {
             refuse(name, place[name] ": " name " = " value[name] " is a constant of AN1292\47s header, here it follows from " word[i + 1] \
                    ": remove it; of a whole header of AN1292\47s `make import HEADER=file` makes a motor file and a userparams.h")
-            return 1
+            if (whole) return 1
         }
     }
     return 0

@@ -5,8 +5,8 @@
 #
 # Only the compiler reads the header, so all that it accepts is accepted: comments, expressions, macros, #ifdef, #include. Four steps: names
 # (defined twice, misspelt); texts (firmware/drive/param_text.c); numbers inside them (literals.awk); values (param_check.c). For the steps
-# that follow, what is refused is replaced by the least value of its range, so that it hides no other mistake; how values fit each other is
-# told where it needs none of those. If nothing is wrong, writes STAMP, and to STAMP.d what it depends on.
+# that follow, what is refused is replaced by what was meant, or by the least value of its range, so that it hides no other mistake; how values fit each
+# other is told where it needs none of the latter. If nothing is wrong, writes STAMP, and to STAMP.d what it depends on.
 set -u
 export LC_ALL=C
 
@@ -22,7 +22,7 @@ compiler() {
 
 # The messages of the last compilation as lines for a user; adds the parameters to $work/refused. Exit code: messages.awk
 tell() {
-    awk -F '\t' -v header="$header" -v compiler="$1" -v refused="$work/refused" -v near="$work/near" -f tools/make/messages.awk \
+    awk -F '\t' -v header="$header" -v compiler="$1" -v refused="$work/refused" -v near="$work/near" -v meant="$work/meant" -f tools/make/messages.awk \
         "$work/places" "$work/needs" "$work/messages" >&2
 }
 
@@ -50,8 +50,8 @@ replace() {
     {
         printf '#pragma GCC system_header\n#include_next <userparams.h>\n'
         sed -n 's/^[A-Z_0-9]*$/#undef &/p' "$work/refused"
-        awk -F '\t' 'FILENAME ~ /refused$/ { refused[$1] = 1; next } $1 in refused { printf "#define %s %s\n", $1, $2 }' \
-            "$work/refused" "$work/least"
+        awk -F '\t' 'FILENAME ~ /refused$/ { refused[$1] = 1; next } $1 in refused { printf "#define %s %s\n", $1, $2; delete refused[$1] }' \
+            "$work/refused" "$work/meant" "$work/least"
     } >"$work/replaced/userparams.h"
 }
 
@@ -77,6 +77,7 @@ checked() {
 : >"$work/near"
 : >"$work/foreign"
 : >"$work/needs"
+: >"$work/meant"
 : >"$work/optional"
 header=userparams.h
 known='#include "drive/param_limits.h"
@@ -125,7 +126,7 @@ awk -F '\t' -v refused="$work/refused" 'FILENAME ~ /refused$/ { told[$1] = 1; ne
 {
     printf '#include <userparams.h>\n'
     cut -f 1 "$work/least" "$work/optional" | sed 's/.*/"&" &/'
-} | compiler "$@" -w -E -P -x c - | awk -v refused="$work/refused" -f tools/make/literals.awk >"$work/literals.c"
+} | compiler "$@" -w -E -P -x c - | awk -v refused="$work/refused" -v meant="$work/meant" -f tools/make/literals.awk >"$work/literals.c"
 checked "$work/literals.c" "$@"
 checked firmware/drive/param_check.c "$@" -DOR_ELSE=
 [ ! -s "$work/refused" ] || checked firmware/drive/param_check.c "$@" -DOR_ELSE= # what a value out of its range has kept back
