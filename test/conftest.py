@@ -7,6 +7,7 @@ import subprocess
 import pytest
 
 os.environ["FOC33_QUIET"] = "1" # what a command says on stderr does not depend on how long it takes
+os.environ.pop("ASKED_BY", None) # a command that a test calls names its own options
 
 pytest_plugins = ["unity_suites", "side_by_side", "live_browser"]
 
