@@ -193,7 +193,8 @@ static void limits(void)
                              * 60.0 / (2.0 * PARAM_PI), 32767.0 * erpm), "rpm", erpm, "erpm", "mean innovation that no load makes");
     FIELD(impossible_steps, 0.25, "s", SLOW_ROUND_STEPS * slots, "32 periods", "flux or resistance impossible");
     FIELD(kfi_impossible, 1.0 / PARAM_FLUX_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "change of 1/Kphi that no magnet gives");
-    FIELD(id_off_q13, most / 32.0 + 0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM), "A", q13_a, "Q13 A", "d current's mean deviation");
+    FIELD(id_off_q13, most / 32.0 + fmax(0.2 * PARAM_DEAD_TIME_V * PARAM_IU / (16.0 * D_CURRCNTR_PTERM),
+                                          0.65 * NOMINAL_BUS_V / sqrt(3.0) * LOOPTIME_SEC / (16.0 * 0.001 * MOTOR_LS_MH)), "A", q13_a, "Q13 A", "d current's mean deviation");
     FIELD(rs_impossible, (PARAM_RS_RISES > 0.99 * PARAM_RS_MOST) ? PARAM_RS_RISES : 1.0, "1", 1.0 / 32768.0, "Q15", "change of R that no winding survives, 1: not told");
     FIELD(rs_off_least, PARAM_R_LEAST - 1.0, "1", 1.0 / 32768.0, "Q15", "so far may R be off");
     FIELD(rs_off_most, PARAM_R_MOST - 1.0, "1", 1.0 / 32768.0, "Q15", "upwards");

@@ -82,7 +82,7 @@ def designed(*changes: tuple[str, str], more: str = "", board: str = "mclv") -> 
 def inputs() -> bytes:
     """What a design is made from: the tuner, its files, and the firmware's headers."""
     every = (path for room in ("tuning", "tools/common", "include") for path in sorted((paths.ROOT / room).rglob("*")))
-    files = (path for path in every if path.suffix in (".py", ".toml", ".h"))
+    files = (path for path in every if path.suffix in (".py", ".toml", ".h", ".c"))
     return hashlib.sha256(b"\0".join(str(path).encode() + b"\0" + path.read_bytes() for path in files)).digest()
 
 
