@@ -121,7 +121,7 @@ help: ## [upkeep] this list
 	    printf '  make %-12s %s\n' "$$target" "$$text"; done; done
 
 # ---- runs ----------------------------------------------------------------------------------------------------------------
-# The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder.
+# The front end calls make for the variant that a scenario needs: it must not take over this make's jobs and folder. ASKED_BY: its lines name make's variables.
 alone = env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL -u VARIANT -u SAN -u WERROR -u USERPARAMS -u DEFINES ASKED_BY=make
 python = "$$(cat build/setup/python)"
 # Says now and then that a silent command still runs: $(still) title command

@@ -289,6 +289,11 @@ def test_a_number_whose_meaning_is_plain_keeps_no_other_mistake_back(tmp_path, n
     assert set(told) == {name, "INVKFI_SPEED3", "KCURRB"}, told
 
 
+def test_a_quotient_out_of_range_is_replaced_and_what_follows_from_it_is_no_mistake_of_its_own(tmp_path):
+    told = lines_of(tmp_path, MOTOR_RS_OHM="1.0 * (198/2)", KCURRB="0.5")
+    assert set(told) == {"MOTOR_RS_OHM", "KCURRB"} and "outside 0.01 .. 40 ohm" in told["MOTOR_RS_OHM"], told
+
+
 def test_an_entry_computed_from_macros_is_told_in_one_short_line(tmp_path):
     told = lines_of(tmp_path, INVKFI_SPEED3="NORM_INVKFIBASE*2")
     assert told == {"INVKFI_SPEED3": "INVKFI_SPEED3 must be 0.6 .. 1.6 of NORM_INVKFIBASE: write that, or make tune-fw"}

@@ -72,6 +72,7 @@ class Segment:
 
     @property
     def holds(self) -> int:
+        """How often a hand holds the shaft."""
         return len(self.held)
 
 

@@ -1,9 +1,10 @@
 # Numbers inside the values of userparams.h that C does not read as people do, as a C file that refuses them when it is compiled.
 #
-#   awk -v refused=FILE -v meant=FILE -f literals.awk <VALUES >FILE.c
+#   awk -v refused=FILE -v as_read=FILE -f literals.awk <VALUES >FILE.c
 #
-# VALUES: a line with the quoted name and the value each, macros of the user's own replaced; FILE: the names that are refused already. To `meant` go the
-# values that are meant instead (name, value), which the checks that follow take. An octal number (05500) is refused wherever it stands. A quotient is compared with that of the same numbers with a decimal point: 5/2 is 2 to C, 20/10 is no mistake.
+# VALUES: a line with the quoted name and the value each, macros of the user's own replaced; FILE: the names that are refused already. To `as_read` go
+# the values as people read them (name, value), of what may be refused. An octal number (05500) is refused wherever it stands. A quotient is compared with that
+# of the same numbers with a decimal point: 5/2 is 2 to C, 20/10 is no mistake.
 
 function is_number(token) { return token ~ /^\.?[0-9]/ }
 function is_whole(token) { return token ~ /^[0-9]+[uUlL]*$/ }
@@ -30,7 +31,7 @@ function pointed(text,   result, token) {
 
 function refuse(kind, condition, message) {
     gsub(/["\\]/, "\\\\&", message)
-    print name "\t" floating >meant
+    print name "\t" floating >as_read
     print "PARAM_CHECK(range_of_" name ") { if (" condition ") PARAM_REFUSE(" kind "_" name ", \"" message "\") }"
 }
 

@@ -1,10 +1,11 @@
 # The compiler's messages about userparams.h as lines for a user.
 #
-#   awk -F '\t' -v header=FILE -v compiler=NAME -v refused=FILE -v near=FILE -v meant=FILE -f messages.awk PLACES NEEDS MESSAGES
+#   awk -F '\t' -v header=FILE -v compiler=NAME -v refused=FILE -v near=FILE -v meant=FILE -v as_read=FILE -f messages.awk PLACES NEEDS MESSAGES
 #
 # PLACES: name, file:line, range of each parameter that the header has; NEEDS: a line for each relation, the names that it is computed from;
 # `refused`: what was told so far, to which new names and relations are added; `near`: missing names that were told with a misspelt one;
-# `meant`: names and values that the checks take in place of what was refused, so that nothing follows from that.
+# `meant`: names and values that the checks take in place of what was refused, so that nothing follows from that;
+# `as_read`: what literals.awk made of values that it may refuse.
 # Exit code: 0 the header's own checks have told what they found, 3 one parameter is no C and hides the others, 2 the header cannot be read.
 
 function place_of(text,   word, count, words, i) {
@@ -132,6 +133,7 @@ BEGIN {
     close(refused)
     while ((getline line < meant) > 0) known[substr(line, 1, index(line, "\t") - 1)] = 1
     close(meant)
+    while ((getline line < as_read) > 0) read_as[substr(line, 1, index(line, "\t") - 1)] = line
 }
 FILENAME ~ /places$/ { place[$1] = $2; range[$1] = $3; next }
 FILENAME ~ /needs$/ { needs[count_of_needs++] = " " $0 " "; next }
@@ -160,8 +162,9 @@ match($0, /error: userparams\.h: /) {
         next
     }
     lines[++count] = "foc33: " (first == name && !(first in place) ? header : place_of(text)) ": " text
-    if (match(text, / = [-+0-9]+ is octal to C/)) print name "\t" meaning(substr(text, RSTART + 3), "octal") >>meant
-    if (match(text, / = [-+0-9\/() ]+ divides whole numbers/)) print name "\t" meaning(substr(text, RSTART + 3), "fraction") >>meant
+    if (text ~ / has an octal number, | divides whole numbers, / && name in read_as) print read_as[name] >>meant
+    else if (match(text, / = [-+0-9]+ is octal to C/)) print name "\t" meaning(substr(text, RSTART + 3), "octal") >>meant
+    else if (match(text, / = [-+0-9\/() ]+ divides whole numbers/)) print name "\t" meaning(substr(text, RSTART + 3), "fraction") >>meant
     names[count] = name
     next
 }

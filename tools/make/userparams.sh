@@ -22,7 +22,7 @@ compiler() {
 
 # The messages of the last compilation as lines for a user; adds the parameters to $work/refused. Exit code: messages.awk
 tell() {
-    awk -F '\t' -v header="$header" -v compiler="$1" -v refused="$work/refused" -v near="$work/near" -v meant="$work/meant" -f tools/make/messages.awk \
+    awk -F '\t' -v header="$header" -v compiler="$1" -v refused="$work/refused" -v near="$work/near" -v meant="$work/meant" -v as_read="$work/as_read" -f tools/make/messages.awk \
         "$work/places" "$work/needs" "$work/messages" >&2
 }
 
@@ -78,6 +78,7 @@ checked() {
 : >"$work/foreign"
 : >"$work/needs"
 : >"$work/meant"
+: >"$work/as_read"
 : >"$work/optional"
 header=userparams.h
 known='#include "drive/param_limits.h"
@@ -126,7 +127,7 @@ awk -F '\t' -v refused="$work/refused" 'FILENAME ~ /refused$/ { told[$1] = 1; ne
 {
     printf '#include <userparams.h>\n'
     cut -f 1 "$work/least" "$work/optional" | sed 's/.*/"&" &/'
-} | compiler "$@" -w -E -P -x c - | awk -v refused="$work/refused" -v meant="$work/meant" -f tools/make/literals.awk >"$work/literals.c"
+} | compiler "$@" -w -E -P -x c - | awk -v refused="$work/refused" -v as_read="$work/as_read" -f tools/make/literals.awk >"$work/literals.c"
 checked "$work/literals.c" "$@"
 checked firmware/drive/param_check.c "$@" -DOR_ELSE=
 [ ! -s "$work/refused" ] || checked firmware/drive/param_check.c "$@" -DOR_ELSE= # what a value out of its range has kept back
