@@ -57,13 +57,17 @@ def test_what_is_asked_for_is_the_rated_torque_as_far_as_the_current_allows():
     assert load_onset.asked_nm(weak) == pytest.approx(0.85 * 2.75 * d.motor.kt_nm_per_a)
 
 
-def test_the_virtual_board_holds_the_speed_that_the_model_names_and_not_those_below_it():
+def test_the_virtual_board_holds_the_speeds_from_the_named_one_up_and_those_below_it_by_luck_alone():
     table = replace(lowspeed.Table.read(paths.TABLES / "lowspeed.toml"), measure_s=2.0)
     bench = lowspeed.LowSpeed(table, motor_file.part(HURST), board_file.part("mclv"), Library(library(["PARAMS_IN_RAM"])), quiet=True)
     minimum = replace(of(HURST).choices["MINIMUM_SPEED_RPM"], text="60")
     named = load_onset.lowest_rpm(replace(of(HURST), choices=of(HURST).choices | {"MINIMUM_SPEED_RPM": minimum}), TORQUE_NM)
-    below, next_below = (0.55, 0.6, 0.67, 0.71, 0.75, 0.79), (0.82, 0.84, 0.86, 0.88, 0.9, 0.92, 0.94)
-    held = {share: row["verdict"] == "ok" for share, row in
-            zip((1.0, *below, *next_below), bench.run([(share * named, TORQUE_NM) for share in (1.0, *below, *next_below)], "low"))}
-    assert held[1.0] and sum(held[share] for share in below) <= 1, (named, held) # a load may come at a moment that the rotor lives through
+    below, next_below = (0.55, 0.58, 0.6, 0.63, 0.65, 0.67, 0.69, 0.71, 0.73, 0.75, 0.77, 0.79), (0.82, 0.84, 0.86, 0.88, 0.9, 0.92, 0.94)
+    above = (1.0, 1.03, 1.1, 1.2)
+    every = (*above, *below, *next_below)
+    held = {share: row["verdict"] == "ok" for share, row in zip(every, bench.run([(share * named, TORQUE_NM) for share in every], "low"))}
+    assert all(held[share] for share in above), (named, held)
+    # the rotor may live through a load that comes at a lucky moment: of three neighbours never all, and of twelve no more than a third
+    assert not any(all(held[share] for share in below[first:first + 3]) for first in range(len(below) - 2)), (named, held)
+    assert sum(held[share] for share in below) <= len(below) // 3, (named, held)
     assert sum(not held[share] for share in next_below) >= 2, (named, held)  # there the moment at which the load comes decides
