@@ -149,14 +149,14 @@ def test_a_loop_and_a_step_are_measured_while_the_watch_and_the_lease_go_on_and_
     assert {frame["state"] for frame in frames} == {"CLOSED"} and not any(frame["silent"] for frame in frames)
     assert max(frame["now"]["lease_ms"] for frame in frames) <= LEASE_MS and len({frame["now"]["angle_deg"] for frame in frames}) > 20
     assert frames[0]["measurable"]["why"]["current"] == "the speed loop is being measured" and desk.page.loop().startswith("hz,measured_db,")
-    monkeypatch.setattr(step, "RECORDS", 1)
+    monkeypatch.setattr(step, "RECORDS", 2)
     refusal(lambda: desk.page.act({"measure": {"step": "load", "size": 40}}), "a load step needs the virtual motor's brake")
-    desk.page.act({"measure": {"step": "speed", "size": 10}})
+    desk.page.act({"measure": {"step": "speed", "size": 20}}) # of a tenth, the estimate's ripple moves the 90 % by a third of the rise
     refusal(lambda: desk.page.act({"target": 1600.0}), "a step of the speed is being measured")
     frames = []
     until(lambda: (frames.append(desk.frame()), not loops.told["running"])[1], lambda: str(loops.steps.told), 60.0)
     assert loops.steps.told["figures"]["measured"]["rise_s"] == pytest.approx(loops.steps.told["figures"]["model"]["rise_s"], rel=0.3), loops.steps.told
-    assert {frame["state"] for frame in frames} == {"CLOSED"} and max(frame["now"]["target_rpm"] for frame in frames) == pytest.approx(1650.0, abs=20.0)
+    assert {frame["state"] for frame in frames} == {"CLOSED"} and max(frame["now"]["target_rpm"] for frame in frames) == pytest.approx(1800.0, abs=20.0)
     until(lambda: desk.frame()["now"]["target_rpm"] == pytest.approx(1500.0, abs=2.0), "the target does not come back")
     desk.page.act({"measure": "speed"})
     until(lambda: (desk.frame(), loops.told["done"])[1], "no point", 30.0)
