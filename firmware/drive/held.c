@@ -231,11 +231,12 @@ static void held_learn(drive_t *d, const drive_params_t *p)
     shaft->stood = (shaft->stood == 0u) ? 1u : shaft->stood;
 }
 
-/** What a filter of the back-EMF is behind: what the voltage has changed by, less what the estimator took back by itself through Ed. */
-static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
+/** What a filter of the back-EMF is behind: what the voltage has changed by, less what the estimator took back by itself through Ed. Of what happens at
+ *  once all counts, and where nothing is left of the back-EMF. */
+static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf, voltage_q12_t least_q12)
 {
     const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
-    const int16_t forgotten = (int16_t)((shaft->doubted_steps != 0u) ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT); /* of what happens at once all counts */
+    const int16_t forgotten = (int16_t)((shaft->doubted_steps != 0u || !qm_beyond(emf.q, least_q12)) ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT);
     const int32_t lag = (int32_t)shaft->lag_q12 - forgotten + shaft->emf_q12.q - emf.q - taken_back;
     shaft->lag_q12 = qm_within(lag, -32767, 32767);
 }
@@ -245,7 +246,7 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     uint16_t doubts = held_doubts(d, p, emf);
-    held_follow_lag(shaft, &d->run, emf);
+    held_follow_lag(shaft, &d->run, emf, p->adaptation.emf_least_q12);
     if (shaft->phase != (uint16_t)HELD_NOT) { /* until it is back at its speed, or may be asked again */
         if (along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
             || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS)) {
@@ -254,8 +255,13 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
         }
         doubts = (uint16_t)((shaft->stood != 0u) ? doubts : 0u); /* it stood, and speeds up */
     }
-    shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
-    shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
+    if (doubts == 0u) {
+        shaft->doubted_steps = 0;
+        shaft->doubts = 0;
+    } else {
+        shaft->doubted_steps++;
+        shaft->doubts = (uint16_t)(shaft->doubts + doubts);
+    }
     if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
         shaft->act = (uint16_t)HELD_STOP;
     }
@@ -341,13 +347,19 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
     const dq_t emf = estimator_emf(&d->run.estimator);
-    const uint16_t act = shaft->act;
+    const uint16_t act = shaft->act, least = (uint16_t)p->adaptation.emf_least_q12;
     shaft->act = (uint16_t)HELD_WAITS;
     switch (act) {
     case HELD_STOP: held_stop_angle(d, p); break;
     case HELD_HAS_TURNED:
     case HELD_GOES_ON: held_go_on(d, p, emf, (uint16_t)(act == (uint16_t)HELD_GOES_ON)); break;
-    case HELD_LEARN: held_learn(d, p); break; /* it may have been let go while this waited */
+    case HELD_LEARN:
+        if (held_moved(emf, shaft->emf_q12) <= least >> 1 || qm_beyond(shaft->emf_q12.q, (int16_t)least)) {
+            held_learn(d, p); /* it may have been let go while this waited: so much was R i */
+        } else {              /* nor did it stand */
+            held_enter(shaft, HELD_SETTLES);
+        }
+        break;
     case HELD_TURN_BACK: held_turn_back(d, p, shaft->run_on); break;
     default: break; /* HELD_WAITS */
     }

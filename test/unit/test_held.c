@@ -267,6 +267,18 @@ void test_a_speed_that_swings_is_asked_later(void)
     TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
 }
 
+void test_of_a_back_emf_that_is_gone_all_of_the_lag_stays_until_the_rotor_is_asked(void)
+{
+    const int16_t least = params.adaptation.emf_least_q12;
+    for (int16_t more = 0; more <= 1; more++) {
+        at(1, FAST_ERPM, FAST_ERPM, 0, 3000);
+        rig_emf(0, (int16_t)(least + more));
+        steps(5); /* the observer is still fast */
+        TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase);
+        TEST_ASSERT_EQUAL_INT16(more == 0 ? 1 : 0, shaft->lag_q12 == 3000 - least);
+    }
+}
+
 void test_of_a_back_emf_that_falls_slowly_the_frame_is_turned_back_by_the_last_steps_alone(void)
 {
     int32_t lag = 0;
@@ -796,6 +808,22 @@ void test_all_of_the_current_pulls_a_rotor_that_stands_by_less_than_half_a_right
         TEST_ASSERT_INT16_WITHIN(HELD_PULL_ANGLE, -(int16_t)HELD_PULL_STEPS * HELD_PULL_ANGLE, pulled(direction, 500));
         TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
     }
+}
+
+void test_a_rotor_that_is_let_go_while_the_answer_waits_teaches_no_resistance_where_little_was_to_learn(void)
+{
+    asked(1, 40);
+    shaft->phase = (uint16_t)HELD_ASKED;
+    shaft->act = (uint16_t)HELD_LEARN;
+    rig_emf(0, (int16_t)(40 + params.adaptation.emf_least_q12 / 2 + 1));
+    held_act(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase); /* and the question begins anew */
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+    shaft->phase = (uint16_t)HELD_ASKED;
+    shaft->act = (uint16_t)HELD_LEARN;
+    rig_emf(0, (int16_t)(40 + params.adaptation.emf_least_q12 / 2));
+    held_act(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
 }
 
 void test_a_rotor_that_is_let_go_while_the_answer_waits_has_taught_the_resistance_of_before(void)
