@@ -144,7 +144,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = held_lag_is_none(d, p, weakens) ? 0 : held_lead(&d->run, p, shaft->lag_q12);
-    shaft->patience = (weakens || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
+    shaft->patience = (uint16_t)((weakens || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS);
     shaft->turned_q12 = 0;
     held_turn_back(d, p, held_clear_of_zero(d, lead));
     held_enter(shaft, HELD_SETTLES);
@@ -288,10 +288,10 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
 }
 
 /** 1 where a back-EMF has gone more towards zero than round: that of a rotor which comes to its stop. */
-static uint16_t held_shrinks(dq_t from, dq_t emf, uint16_t moved)
+static uint16_t held_shrinks(dq_t before, dq_t now, uint16_t moved)
 {
     const dq_t none = { 0, 0 };
-    return (uint16_t)(held_moved(emf, none) + (moved >> 1) < held_moved(from, none));
+    return (uint16_t)(held_moved(now, none) + (moved >> 1) < held_moved(before, none));
 }
 
 /** The angle stands. */
