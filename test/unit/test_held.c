@@ -323,12 +323,12 @@ void test_a_back_emf_that_falls_as_that_of_a_rotor_that_comes_to_its_stop_is_wai
 {
     const int16_t moves = params.adaptation.emf_least_q12;
     EACH_DIRECTION(direction) {
-        for (uint16_t turns = 0; turns < 2u; turns++) { /* 1: it turns by as much as it falls */
+        for (uint16_t turns = 0; turns < 2u; turns++) { /* 1: it turns by two thirds of what it falls */
             uint16_t count = 0;
             asked(direction, 0);
             while (shaft->phase == (uint16_t)HELD_SETTLES && count < 3u * HELD_PATIENCE_STEPS) {
                 const int16_t falls = (int16_t)((3 * (int16_t)HELD_PATIENCE_STEPS - (int16_t)count) * moves);
-                rig_emf(turns ? (int16_t)(-falls + 3 * (int16_t)HELD_PATIENCE_STEPS * moves) : 0, (int16_t)(direction * falls));
+                rig_emf(turns ? (int16_t)(2 * (3 * (int16_t)HELD_PATIENCE_STEPS * moves - falls) / 3) : 0, (int16_t)(direction * falls));
                 steps(1);
                 count++;
             }
