@@ -125,26 +125,17 @@ QM_WRAPS static int16_t held_clear_of_zero(const drive_t *d, int16_t lead)
     return qm_beyond(sixth, 6 * HELD_CLEAR_ANGLE) ? lead : (int16_t)(uint16_t)((uint16_t)lead + clear);
 }
 
-/** 1 where what seems a lag of the filter is R: it is too high where the back-EMF has fallen beyond zero; and a frame that is not where its lag would have
- *  taken it has a d part against that, which but for R only a d current could make. A probe's d current takes a speed that was none. */
-static uint16_t held_lag_is_none(const drive_t *d, const drive_params_t *p, uint16_t weakens)
-{
-    const dq_t emf = estimator_emf(&d->run.estimator);
-    const int16_t ahead = along_direction(d, emf.d), least = p->adaptation.emf_least_q12; /* with a lag's sign */
-    return (uint16_t)(d->run.probe_phase == (uint16_t)PROBE_TEST || along_direction(d, emf.q) < -least
-                      || (!weakens && qm_beyond(ahead, least) && (ahead ^ d->run.held.lag_q12) < 0));
-}
-
 /** The angle stops where a rotor would be that stopped at once. */
 static void held_stop_angle(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
-    const uint16_t weakens = qm_beyond(d->run.control.ref_q13.d, (int16_t)(p->current_max_q13 >> HELD_FAR_SHIFT));
+    uint16_t turns_far;
     int16_t lead;
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
-    lead = held_lag_is_none(d, p, weakens) ? 0 : held_lead(&d->run, p, shaft->lag_q12);
-    shaft->patience = (uint16_t)((weakens || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS);
+    lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
+    turns_far = (uint16_t)(qm_beyond(lead, HELD_FAR_LEAD) || qm_beyond(d->run.control.ref_q13.d, (int16_t)(p->current_max_q13 >> HELD_FAR_SHIFT)));
+    shaft->patience = turns_far ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
     shaft->turned_q12 = 0;
     held_turn_back(d, p, held_clear_of_zero(d, lead));
     held_enter(shaft, HELD_SETTLES);
@@ -153,35 +144,38 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     d->run.estimator.omega_filtered_q16 = 0;
 }
 
-/** The estimator goes on. @param stood 1: the rotor stood, and turns now; 0: it has turned all the time, as fast as when it was asked, and by what the
- *  back-EMF gained since */
-static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t stood)
+/** The estimator goes on. @param omega_erpm of the rotor @param load of the observer */
+static void held_go_on(drive_t *d, const drive_params_t *p, speed_erpm_t omega_erpm, int32_t load_q16)
 {
     drive_run_t *run = &d->run;
-    held_t *shaft = &run->held;
-    const speed_erpm_t omega_erpm = held_speed(run, emf);
-    int32_t load_q16 = run->observer.load_q16;
-    if (stood) {
-        load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : load_q16;
-        shaft->stood = 2;
-    } else {
-        shaft->turned_q12 = qm_within(shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience)), -32767, 32767);
-    }
-    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
-    held_enter(shaft, HELD_TURNS);
+    held_enter(&run->held, HELD_TURNS);
     drive_update_model(run, p, run->control.reference_erpm, omega_erpm);
     observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, omega_erpm, 0);
     run->observer.load_q16 = load_q16;
     run->observer.fast_share_q15 = 32767;
     run->observer.gate_level = 0;
-    shaft->lag_q12 = 0;
-    shaft->emf_q12 = emf;
+    run->held.lag_q12 = 0;
 }
 
-/** Half of the d part by which the back-EMF of a rotor as fast as asked would turn in so many steps: three, nearly pi, of E times the turn. */
-static NOINLINE uint16_t held_half(const drive_run_t *run, const drive_params_t *p, uint16_t steps)
+/** It has turned all the time: as fast as when it was asked, and by what the back-EMF gained since. */
+static void held_has_turned(drive_t *d, const drive_params_t *p, dq_t emf)
 {
-    return (uint16_t)(3 * qm_abs(qm_mulhi(run->held.emf_q12.q, held_as_asked(run, p, steps))));
+    held_t *shaft = &d->run.held;
+    const int32_t sum = shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience));
+    shaft->turned_q12 = qm_within(sum, -32767, 32767);
+    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(&d->run, shaft->turned_q12), 1));
+    held_go_on(d, p, held_speed(&d->run, emf), d->run.observer.load_q16);
+}
+
+/** It stood, and turns now. */
+static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
+{
+    drive_run_t *run = &d->run;
+    held_t *shaft = &run->held;
+    const int32_t load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : run->observer.load_q16;
+    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
+    shaft->stood = 2;
+    held_go_on(d, p, held_speed(run, emf), load_q16);
 }
 
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
@@ -191,10 +185,11 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     held_t *shaft = &d->run.held;
     const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1;                                              /* dead time shakes it by as much */
     const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps); /* since what it is compared with */
-    const uint16_t half = held_half(&d->run, p, steps);
+    const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
     const int16_t turned = qm_sub_limited(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
     const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least));
+
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
         shaft->act = (uint16_t)(((turns && tells) || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
     } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && steps >= HELD_ASK_STEPS)) {
@@ -207,16 +202,16 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
 }
 
 /** The rotor stands: all of the back-EMF is R i, and turned the angle while it seemed one. */
-static void held_learn(drive_t *d, const drive_params_t *p)
+static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     drive_run_t *run = &d->run;
     held_t *shaft = &run->held;
     const current_q13_t iq_q13 = run->control.i_q13.q;
-    const uint16_t ri_q12 = (uint16_t)model_header_ri(p, qm_abs(iq_q13)), more_q12 = (uint16_t)qm_abs(shaft->emf_q12.q);
+    const uint16_t ri_q12 = (uint16_t)model_header_ri(p, qm_abs(iq_q13)), more_q12 = (uint16_t)qm_abs(emf.q);
     held_enter(shaft, HELD_STANDS);
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
         int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
-        share = ((iq_q13 ^ shaft->emf_q12.q) < 0) ? (int16_t)-share : share;
+        share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
             shaft->run_on = held_as_asked(run, p, (uint16_t)(shaft->doubted_steps + 1u));
             shaft->act = (uint16_t)HELD_TURN_BACK;
@@ -225,18 +220,18 @@ static void held_learn(drive_t *d, const drive_params_t *p)
         drive_update_model(run, p, run->control.reference_erpm, 0);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
         run->estimator.e_q_q28 = 0;
-        shaft->emf_q12.d = 0;
-        shaft->emf_q12.q = 0;
+        emf.d = 0;
+        emf.q = 0;
     }
     shaft->stood = (shaft->stood == 0u) ? 1u : shaft->stood;
+    shaft->emf_q12 = emf;
 }
 
-/** What a filter of the back-EMF is behind: what the voltage has changed by, less what the estimator took back by itself through Ed. Of what happens at
- *  once all counts, and where nothing is left of the back-EMF. */
-static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf, voltage_q12_t least_q12)
+/** What a filter of the back-EMF is behind: what the voltage has changed by, less what the estimator took back by itself through Ed. */
+static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
     const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
-    const int16_t forgotten = (int16_t)((shaft->doubted_steps != 0u || !qm_beyond(emf.q, least_q12)) ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT);
+    const int16_t forgotten = (int16_t)((shaft->doubted_steps != 0u) ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT); /* of what happens at once all counts */
     const int32_t lag = (int32_t)shaft->lag_q12 - forgotten + shaft->emf_q12.q - emf.q - taken_back;
     shaft->lag_q12 = qm_within(lag, -32767, 32767);
 }
@@ -246,7 +241,7 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     uint16_t doubts = held_doubts(d, p, emf);
-    held_follow_lag(shaft, &d->run, emf, p->adaptation.emf_least_q12);
+    held_follow_lag(shaft, &d->run, emf);
     if (shaft->phase != (uint16_t)HELD_NOT) { /* until it is back at its speed, or may be asked again */
         if (along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
             || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS)) {
@@ -255,13 +250,8 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
         }
         doubts = (uint16_t)((shaft->stood != 0u) ? doubts : 0u); /* it stood, and speeds up */
     }
-    if (doubts == 0u) {
-        shaft->doubted_steps = 0;
-        shaft->doubts = 0;
-    } else {
-        shaft->doubted_steps++;
-        shaft->doubts = (uint16_t)(shaft->doubts + doubts);
-    }
+    shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
+    shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
     if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
         shaft->act = (uint16_t)HELD_STOP;
     }
@@ -287,13 +277,6 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
     observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
 }
 
-/** 1 where a back-EMF has gone more towards zero than round: that of a rotor which comes to its stop. */
-static uint16_t held_shrinks(dq_t before, dq_t now, uint16_t moved)
-{
-    const dq_t none = { 0, 0 };
-    return (uint16_t)(held_moved(now, none) + (moved >> 1) < held_moved(before, none));
-}
-
 /** The angle stands. */
 static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
@@ -303,15 +286,11 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->turned_q12 = qm_sub_limited(shaft->turned_q12, qm_sub_limited(base_q12, emf.q));
     switch (shaft->phase) {
     case HELD_SETTLES:
-        if (moved <= most >> 1 && shaft->steps >= HELD_SETTLE_STEPS) {
+        if (moved <= most >> 1) {
             shaft->patience = shaft->steps;
             shaft->turned_q12 = 0;
-            shaft->emf_q12 = emf;
             held_enter(shaft, HELD_ASKED);
-            if (held_half(&d->run, p, 1) > most) { /* a rotor as fast as that would have turned it */
-                shaft->act = (uint16_t)HELD_LEARN;
-            }
-        } else if (shaft->steps > shaft->patience && !held_shrinks(shaft->emf_q12, emf, moved)) {
+        } else if (shaft->steps > shaft->patience) {
             shaft->act = (uint16_t)HELD_HAS_TURNED;
             emf.q = 0; /* all of it is in the sum */
         } else {       /* the current changes */
@@ -347,20 +326,27 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
     const dq_t emf = estimator_emf(&d->run.estimator);
-    const uint16_t act = shaft->act, least = (uint16_t)p->adaptation.emf_least_q12;
+    const uint16_t act = shaft->act;
+
     shaft->act = (uint16_t)HELD_WAITS;
     switch (act) {
     case HELD_STOP: held_stop_angle(d, p); break;
     case HELD_HAS_TURNED:
-    case HELD_GOES_ON: held_go_on(d, p, emf, (uint16_t)(act == (uint16_t)HELD_GOES_ON)); break;
+        held_has_turned(d, p, emf);
+        shaft->emf_q12 = emf;
+        break;
     case HELD_LEARN:
-        if (held_moved(emf, shaft->emf_q12) <= least >> 1 || qm_beyond(shaft->emf_q12.q, (int16_t)least)) {
-            held_learn(d, p); /* it may have been let go while this waited: so much was R i */
-        } else {              /* nor did it stand */
+        if (held_moved(emf, shaft->emf_q12) <= (uint16_t)p->adaptation.emf_least_q12 >> 1) { /* it was not let go while this waited */
+            held_learn(d, p, emf);
+        } else { /* nor did it stand */
             held_enter(shaft, HELD_SETTLES);
         }
         break;
     case HELD_TURN_BACK: held_turn_back(d, p, shaft->run_on); break;
+    case HELD_GOES_ON:
+        held_turns_again(d, p, emf);
+        shaft->emf_q12 = emf;
+        break;
     default: break; /* HELD_WAITS */
     }
 }

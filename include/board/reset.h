@@ -44,7 +44,8 @@ extern volatile uint16_t board_reset_cause;
 extern volatile uint16_t board_trap_intcon1;
 
 /** Reads and clears RCON. Once, at the start.
- *  @return what to start with: the kept fault after a reset by watchdog, trap or illegal opcode (WATCHDOG or TRAP if none), else FAULT_NONE */
+ *  @return what to start with: the kept fault after a reset by watchdog, trap or illegal opcode (WATCHDOG or TRAP if none was kept),
+ *          else FAULT_NONE */
 drive_fault_t reset_take(void);
 
 /** Keeps a fault (or FAULT_NONE) for the time after a reset. */

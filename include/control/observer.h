@@ -72,7 +72,8 @@ int32_t observer_sum(int32_t omega_q16, int32_t change);
 /** Begins at a known angle and speed with a known q current, calm. @param speed_erpm at most 32700 */
 void observer_preset(observer_t *o, const observer_params_t *p, uint32_t rho_q32, speed_erpm_t speed_erpm, current_q13_t iq_q13);
 
-/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 @param gate_level some thousand at most */
+/** What counts as a large innovation after so much unrest: up to 16 times as much.
+ *  @param calm_erpm 0..32767 @param gate_level some thousand at most */
 int16_t observer_gate(int16_t calm_erpm, uint16_t gate_level);
 
 /** As much unrest as at the hand-over, at least. */

@@ -40,7 +40,8 @@ duty_t svm_leg(const svm_params_t *p, int16_t duty, const current_q13_t *i_q13);
  *  @param duty_per_volt_q16 duty counts per voltage count * 65536, from the measured bus (see bus_update_gain())
  *  @param dead of the phase currents that the controllers ask for at the centre of the pulse, see svm_compensation(). The measured
  *         ones are a period older and carry the converter's steps; compensation that follows them makes a current stick at zero
- *  @param i measured phase currents, for the sampling window @param d the duties: written in place, for a returned structure is copied */
+ *  @param i measured phase currents, for the sampling window
+ *  @param d the duties: written in place, for a returned structure is copied */
 void svm(const svm_params_t *p, alphabeta_t v, uint16_t duty_per_volt_q16, const dead_duties_t *dead, const phases_t *i, duties_t *d);
 
 #endif

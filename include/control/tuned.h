@@ -129,12 +129,11 @@
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
 #define HELD_FAR_SHIFT 3         /* [shift] and 1/8 of the largest current as d current, which goes as the angle stops | soak */
 #define HELD_CLEAR_ANGLE 1024 /* [2^-16 turn] 5.6 degrees: so far from a phase's zero crossing the angle stands | held */
-#define HELD_PATIENCE_STEPS 5u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
-#define HELD_SETTLE_STEPS 2u /* [steps] of 16 periods at least: what the frame's turn shakes may stand still by chance in the first | soak */
+#define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
 #define HELD_TURNED_RAD 0.175 /* [rad] ten degrees, electrical, by what its back-EMF gained: so far no shaft that is held goes | loadsteps */
 #define HELD_PULL_ANGLE 182   /* [2^-16 turn] a degree a step, by which all of the current pulls a rotor that stands | loadsteps */
 #define HELD_PULL_STEPS 32u   /* [steps] 32 degrees, and back: a load may have stopped it so far ahead of the frame, or behind | loadsteps */
-#define HELD_REST_STEPS 5u    /* [steps] of 16 periods that a frame that was turned back takes to settle | loadsteps */
+#define HELD_REST_STEPS 2u    /* [steps] of 16 periods that a frame that was turned back takes to settle | loadsteps */
 #define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */
 #define HELD_ASK_MOST_STEPS 32u /* [steps] of 16 periods, for a back-EMF too small to tell sooner | lowspeed */
 #define HELD_SLOW_STEPS 64u    /* [steps] of 16 periods, in which the heaviest rotor that was let go is faster than what follows | held */
@@ -161,7 +160,7 @@
 #define SIGNALS_STANDS_SHIFT 2      /* [shift] below a quarter of the reference an innovation is in time with nothing | pulse */
 #define SIGNALS_OPEN_SHIFT 2        /* [shift] an open phase carries less than a quarter of its share, in both rules | run SCENARIO=fault_open_phase */
 #define SIGNALS_BLUR_TIMES 4        /* [1] dead time may turn an estimate by a quarter of the back-EMF that it is made from, and more below | run SCENARIO=stop_from_top */
-#define PROBE_WAIT_STEPS 3          /* [32 periods] the rotor seems to turn for 5 ms before a probe | run SCENARIO=fault_stall */
+#define PROBE_WAIT_STEPS 13         /* [32 periods] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */
 #define PROBE_STEPS 25              /* [32 periods] a probe takes 40 ms: more than the estimator's filters at the lowest speed | run SCENARIO=fault_stall */
 #define PROBE_DIP_STEPS 6           /* [32 periods] or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long | run SCENARIO=fault_stall */
 #define PROBE_CALM_STEPS 63       /* [steps] of 32 periods, a tenth of a second after a probe: until its own unrest is over | run SCENARIO=fault_stall */

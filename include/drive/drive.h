@@ -180,7 +180,8 @@ void drive_init(drive_t *d, const drive_params_t *p);
  *  asked whether it stands gets field weakening for no more than twice this, until it is at half of the reference */
 void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm, speed_erpm_t speed_erpm);
 
-/** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise. @param direction +1 or -1 */
+/** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
+ *  @param direction +1 or -1 */
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
 /** x turned into the direction of rotation. */

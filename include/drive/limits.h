@@ -80,7 +80,8 @@ current_q13_t limits_derated(const drive_params_t *p, int16_t bus_q15);
 /** Narrows the q current's limit to what supply and bus allow, while the q current drives; braking has REGEN_LIMIT_V. After limits_current(). */
 void limits_driving(drive_t *d, const drive_params_t *p);
 
-/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: with a filter's lag it would swing */
+/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: a filter's lag would let the bus
+ *  capacitor and this limit swing */
 void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15);
 
 /** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */
@@ -102,7 +103,8 @@ void bus_update_voltage_limit(drive_t *d, const drive_params_t *p);
 int16_t bus_sample(int16_t v_bus_raw);
 
 /** Filters the bus, checks it, and follows the bus of this moment with the modulator's gain: after a step of the supply a late gain is a wrong
- *  voltage, which the estimator takes for speed. Slots 1, 5, 9, 13, in every state. @param v_bus_raw the converter's result, any value */
+ *  voltage, which the estimator takes for speed. Slots 1, 5, 9, 13, in every state.
+ *  @param v_bus_raw the converter's result, any value */
 void bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus_raw);
 
 /* ---- The brake chopper: a resistor on the bus turns into heat what the supply does not take back ----

@@ -297,7 +297,7 @@ void test_rotor_is_probed_where_half_more_resistance_and_dead_time_would_explain
     loaded(2.0F * (1.0F - dead) - 0.02F);
     TEST_ASSERT_EQUAL_INT16(0, probe(300, 0, 400));
     loaded(2.0F * (1.0F - dead) + 0.02F);
-    TEST_ASSERT_EQUAL_INT16(0, probe(PROBE_WAIT_STEPS, 0, 400)); /* it seems to turn for 5 ms */
+    TEST_ASSERT_EQUAL_INT16(0, probe(13, 0, 400)); /* it seems to turn for 20 ms */
     TEST_ASSERT_EQUAL_INT16(drive.run.control.ref_q13.q, probe(15, 0, 400));
     TEST_ASSERT_EQUAL_INT16(0, (probe(20, 0, 400), drive.run.probe_id_q13)); /* 40 ms and the slope */
     loaded(2.2F);
@@ -311,11 +311,11 @@ void test_rotor_is_probed_where_half_more_resistance_and_dead_time_would_explain
 void test_probe_of_a_standing_rotor_stays_until_the_stall_and_that_of_a_turning_one_ends(void)
 {
     loaded(2.2F);
-    (void)probe(PROBE_WAIT_STEPS + 3u, 0, 400);
+    (void)probe(16, 0, 400);
     rig_speed(1000);
     TEST_ASSERT_GREATER_THAN_INT16(0, (probe(200, 30, 100), drive.run.probe_id_q13)); /* E has the current's direction */
     loaded(2.2F);
-    (void)probe(PROBE_WAIT_STEPS + 3u, 0, 400);
+    (void)probe(16, 0, 400);
     rig_speed(1000);
     TEST_ASSERT_EQUAL_INT16(0, (probe(50, 20, 100), drive.run.probe_id_q13)); /* slow, but it turns */
 }
@@ -325,7 +325,7 @@ void test_d_current_of_a_probe_rises_and_falls_by_an_eighth_of_the_largest_a_ste
     const int16_t slope = (int16_t)(params.current_max_q13 >> 3);
     int16_t most;
     loaded(3.4F);
-    TEST_ASSERT_EQUAL_INT16(0, probe(PROBE_WAIT_STEPS, 0, 400));
+    TEST_ASSERT_EQUAL_INT16(0, probe(13, 0, 400));
     most = drive.run.control.ref_q13.q;
     TEST_ASSERT_GREATER_THAN_INT16(4 * slope, most);
     TEST_ASSERT_EQUAL_INT16(slope, probe(1, 0, 400));
@@ -338,13 +338,13 @@ void test_d_current_of_a_probe_rises_and_falls_by_an_eighth_of_the_largest_a_ste
 void test_a_probe_goes_through_its_phases(void)
 {
     loaded(2.2F);
-    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(PROBE_WAIT_STEPS - 1u, 0, 400), drive.run.probe_phase));
-    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(1, 0, 400), drive.run.probe_phase)); /* 5 ms */
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(12, 0, 400), drive.run.probe_phase));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(1, 0, 400), drive.run.probe_phase)); /* 13 steps, 20 ms */
     TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(24, 0, 400), drive.run.probe_phase));
     TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(1, 0, 400), drive.run.probe_phase)); /* 25 steps, 40 ms */
-    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(PROBE_EVERY_STEPS - PROBE_WAIT_STEPS - PROBE_STEPS, 0, 400), drive.run.probe_phase));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(3087, 0, 400), drive.run.probe_phase));
     TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(1, 0, 400), drive.run.probe_phase));
-    (void)probe(PROBE_WAIT_STEPS, 0, 400);
+    (void)probe(13, 0, 400);
     drive.run.handover.id_q13 = 10; /* nothing to doubt */
     TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(1, 0, 400), drive.run.probe_phase));
 }
@@ -366,14 +366,14 @@ void test_probe_comes_again_after_five_seconds_or_a_dip_of_10_ms(void)
 void test_probe_comes_again_after_half_a_second_where_something_changed_fast_but_for_its_own_unrest(void)
 {
     loaded(2.2F);
-    (void)probe(PROBE_WAIT_STEPS + PROBE_STEPS, 0, 400);
+    (void)probe(38, 0, 400);
     TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, drive.run.probe_phase);
     drive.run.observer.fast_share_q15 = 32767; /* the gate opens within a tenth of a second: the probe's own doing */
     (void)probe(PROBE_CALM_STEPS, 0, 400);
     drive.run.observer.fast_share_q15 = 0;
     TEST_ASSERT_EQUAL_INT16(0, probe(600, 0, 400));
     loaded(2.2F);
-    (void)probe(PROBE_WAIT_STEPS + PROBE_STEPS, 0, 400);
+    (void)probe(38, 0, 400);
     (void)probe(PROBE_CALM_STEPS, 0, 400);
     drive.run.observer.fast_share_q15 = 32767;
     (void)probe(1, 0, 400);
