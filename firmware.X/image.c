@@ -20,7 +20,6 @@
 #include "firmware/control/svm.c"
 #include "firmware/control/transforms.c"
 #include "firmware/drive/catch.c"
-#include "firmware/drive/drive.c"
 #include "firmware/drive/held.c"
 #include "firmware/drive/inputs.c"
 #include "firmware/drive/limits.c"

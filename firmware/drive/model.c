@@ -86,6 +86,17 @@ voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p)
     return (int16_t)(qm_mulhi_su(run->control.i_q13.q, run->model.rs_q16) * (1 << p->estimator.rs_exp));
 }
 
+void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm, speed_erpm_t speed_erpm)
+{
+    const uint16_t turns = (uint16_t)(run->held.phase == (uint16_t)HELD_NOT); /* as it should */
+    fieldweak_tick(&run->fieldweak, &p->fieldweak, &run->model, turns ? ref_erpm : held_weakened_for(p, qm_abs(ref_erpm), qm_abs(speed_erpm)));
+    salient_model(run, p);
+    adaptation_apply(&run->adaptation, &p->adaptation, &run->model);
+    if (held_angle_stands(&run->held)) {
+        run->model.inv_kfi = 0;
+    }
+}
+
 /** 1 where the closed loop teaches: it rests until the observer runs, while the speed changes fast, and at the limits of current and voltage. It does
  *  not wait for the hand-over's d current to go: where R, L and Kphi are all wrong, the lock needs it before; what dR i_d puts into Ed passes with
  *  that current. */

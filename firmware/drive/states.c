@@ -109,6 +109,38 @@ uint16_t drive_outputs(const drive_t *d)
     return (uint16_t)((d->state == (uint16_t)DRIVE_BOOTSTRAP || (drive_shorts(d) && d->periods != 0u)) ? OUTPUTS_BOOTSTRAP : OUTPUTS_OFF);
 }
 
+INLINE int16_t along_direction(const drive_t *d, int16_t x)
+{
+    return qm_with_sign(x, d->direction);
+}
+
+void drive_zero(void *object, uint16_t size)
+{
+    uint8_t *byte = object;
+    uint16_t left = size;
+    do {
+        *byte = 0;
+        byte++;
+        left--;
+    } while (left != 0u);
+}
+
+void drive_init(drive_t *d, const drive_params_t *p)
+{
+    drive_zero(d, sizeof *d);
+    d->direction = 1;
+    SELFTEST_KEEP(d, direction, 1);
+    SELFTEST_KEEP(d, state, DRIVE_CALIBRATE); /* 0, as all of it: drive_enter() would find nothing else to do */
+    SELFTEST_KEEP(d, fault, FAULT_NONE);
+    SELFTEST_KEEP(d, offset_a, 0);
+    SELFTEST_KEEP(d, offset_b, 0);
+    d->bus_q31 = (int32_t)p->bus_nominal_q15 * 65536;
+    heat_init(d, p);
+    bus_update_gain(d, p, p->bus_nominal_q15);
+    bus_update_voltage_limit(d, p);
+    drive_update_model(&d->run, p, p->end_erpm, p->end_erpm);
+}
+
 void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
 {
     drive_run_t *run = &d->run;
@@ -129,6 +161,13 @@ void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
     catch_begin(run, p);
     mode_start(d, p);
     d->command.run = 1;
+}
+
+void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
+{
+    if (d->state == (uint16_t)DRIVE_STOPPED && !d->command.run) {
+        drive_begin(d, p, direction);
+    }
 }
 
 /** Leaves a state whose bridge is off, or is left by a fault. Called nowhere else, so that catch.c's wcet line can name this way out. */

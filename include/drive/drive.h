@@ -170,21 +170,4 @@ struct drive {
 
 #define CALIBRATION_LOG2 10 /* 1024 samples: 51 ms at 20 kHz */
 
-/** Clears bytes: assigning a zero struct would copy it from flash. */
-void drive_zero(void *object, uint16_t size);
-
-/** Brings the object to CALIBRATE; every field gets its start value. */
-void drive_init(drive_t *d, const drive_params_t *p);
-
-/** The motor's constants for a speed reference: the tables, and what the motor has shown. @param speed_erpm of the rotor: one that was
- *  asked whether it stands gets field weakening for no more than twice this, until it is at half of the reference */
-void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm, speed_erpm_t speed_erpm);
-
-/** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
- *  @param direction +1 or -1 */
-void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
-
-/** x turned into the direction of rotation. */
-int16_t along_direction(const drive_t *d, int16_t x);
-
 #endif

@@ -40,6 +40,10 @@ voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p);
  *  lock, with flux, R and L all off; the current is nearly all d current there and says nothing of R. */
 void model_learn_step(drive_t *d, const drive_params_t *p);
 
+/** The motor's constants for a speed reference: the tables, and what the motor has shown. @param speed_erpm of the rotor: one that was
+ *  asked whether it stands gets field weakening for no more than twice this, until it is at half of the reference */
+void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t ref_erpm, speed_erpm_t speed_erpm);
+
 /** The motor's constants follow the speed reference, and what was learnt; R a little less while d current of the hand-over is left. Slot 14 in closed loop. */
 void model_update(drive_t *d, const drive_params_t *p);
 

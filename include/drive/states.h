@@ -100,6 +100,15 @@ typedef enum { OUTPUTS_OFF,
                OUTPUTS_BOOTSTRAP,
                OUTPUTS_PWM } outputs_t;
 
+/** Clears bytes: assigning a zero struct would copy it from flash. */
+void drive_zero(void *object, uint16_t size);
+
+/** x turned into the direction of rotation. */
+int16_t along_direction(const drive_t *d, int16_t x);
+
+/** Brings the object to CALIBRATE; every field gets its start value. */
+void drive_init(drive_t *d, const drive_params_t *p);
+
 /** 1 where the table has this transition. */
 uint16_t drive_may_follow(uint16_t state, drive_state_t next);
 
@@ -143,6 +152,10 @@ uint16_t drive_shorts(const drive_t *d);
 
 /** What drives the bridge (outputs_t) in the drive's present state. */
 uint16_t drive_outputs(const drive_t *d);
+
+/** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
+ *  @param direction +1 or -1 */
+void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
 /** drive_start() in place, for the one who calls it and has seen that the drive may start. */
 void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction);

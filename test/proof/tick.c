@@ -64,7 +64,6 @@ static void adaptation_learn_bounded(adaptation_t *a, const adaptation_params_t 
 static void startup_ramp_turning(drive_t *d, const drive_params_t *p);
 #define startup_ramp_from_here startup_ramp_turning
 #include "firmware/drive/catch.c"
-#include "firmware/drive/drive.c"
 #include "firmware/drive/held.c"
 #include "firmware/drive/model.c"
 #include "firmware/drive/modes/bringup.c"

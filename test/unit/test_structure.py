@@ -88,9 +88,8 @@ PREFIXES = {
     "control/motor_model": "adaptation fieldweak salience",
     "control/soft_float": "root soft",
     "control/transforms": "forced trig",
-    "drive/drive": "along drive",
     "drive/limits": "bus limits",
-    "drive/model": "model salient",
+    "drive/model": "drive model salient",
     "drive/modes/bringup": "bringup mode",
     "drive/modes/identify": "identify mode",
     "drive/modes/modes": "mode snapshot",
@@ -100,7 +99,7 @@ PREFIXES = {
     "drive/protection": "heat ntc overload protection",
     "drive/speed": "reference speed",
     "drive/startup": "calibration handover startup",
-    "drive/states": "drive idle states",
+    "drive/states": "along drive idle states",
     "drive/tick": "dead deferred drive",
 }
 """Of the functions of a file, where they are not its name's first word."""
