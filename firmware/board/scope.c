@@ -2,13 +2,15 @@
 #include "board/scope.h"
 
 #if SCOPE
-QM_WRAPS uint16_t memory_is_ram(uint16_t address, uint16_t bytes)
+/** 1 if all of these bytes are RAM: nothing else may be read, for reading a register may act. What is below wraps to beyond the end. */
+static QM_WRAPS uint16_t memory_is_ram(uint16_t address, uint16_t bytes)
 {
     uint16_t from = (uint16_t)(address - MEMORY_RAM_START);
     return (uint16_t)(from < MEMORY_RAM_BYTES && bytes <= (uint16_t)(MEMORY_RAM_BYTES - from));
 }
 
-uint16_t memory_is_variable(uint16_t address, uint16_t bytes)
+/** 1 if all of these bytes of RAM are variables: no stack. */
+static uint16_t memory_is_variable(uint16_t address, uint16_t bytes)
 {
     uint16_t from = (uint16_t)(address - MEMORY_RAM_START);
     return (uint16_t)(from + bytes <= MEMORY_VARIABLE_BYTES);
@@ -70,6 +72,34 @@ QM_INLINE void scope_fill(scope_t *s, int16_t *following, uint16_t is_rare)
     }
 }
 
+/** Words of any number. @return where the next row goes */
+QM_INLINE int16_t *copy_words(const scope_t *s)
+{
+    const volatile int16_t *const volatile *source = s->source;
+    int16_t *at = s->at;
+    uint16_t left = s->words;
+    do {
+        *at = **source; /* wcet: at most 8 turns */
+        at++;
+        source++;
+        left--;
+    } while (left != 0u);
+    return at;
+}
+
+/** A row that is not the usual one: any length, whatever it costs. */
+static void scope_record_unusual(scope_t *s)
+{
+    if (s->mode == s->looking) {
+        scope_look(s, s->trigger, copy_words(s));
+    } else if (s->before != 0u) {
+        scope_fill(s, copy_words(s), 1);
+    } else {
+        scope_turn(s, board_scope_array);
+        scope_go_on(s, copy_words(s));
+    }
+}
+
 void scope_tick(scope_t *s, int16_t *begin)
 {
     if (s->mode == SCOPE_IDLE || --s->wait != 0u) {
@@ -107,7 +137,8 @@ void scope_tick(scope_t *s, int16_t *begin)
 
 int16_t board_scope_array[SCOPE_ARRAY_WORDS];
 
-void scope_init(scope_t *s)
+/** Nothing has been recorded. */
+static void scope_init(scope_t *s)
 {
     s->mode = SCOPE_IDLE;
     s->at = board_scope_array;
@@ -224,7 +255,9 @@ static uint16_t take_setting(scope_t *s, const uint8_t *request, uint16_t size)
     return 1;
 }
 
-uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
+/** A request to record, as it stands in a frame: state, channels, periods between rows, channels, trigger. Without channels the scope stops.
+ *  @return 1 if it was understood; in any case a running record has ended. 0: the array is empty until the next good request, or device info */
+static uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
 {
     uint16_t is_good = take_setting(s, request, size);
     if (!is_good) { /* clients that do not look at the error find nothing to read */
@@ -232,33 +265,6 @@ uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size)
         s->last = board_scope_array;
     }
     return is_good;
-}
-
-/** Words of any number. @return where the next row goes */
-QM_INLINE int16_t *copy_words(const scope_t *s)
-{
-    const volatile int16_t *const volatile *source = s->source;
-    int16_t *at = s->at;
-    uint16_t left = s->words;
-    do {
-        *at = **source; /* wcet: at most 8 turns */
-        at++;
-        source++;
-        left--;
-    } while (left != 0u);
-    return at;
-}
-
-void scope_record_unusual(scope_t *s)
-{
-    if (s->mode == s->looking) {
-        scope_look(s, s->trigger, copy_words(s));
-    } else if (s->before != 0u) {
-        scope_fill(s, copy_words(s), 1);
-    } else {
-        scope_turn(s, board_scope_array);
-        scope_go_on(s, copy_words(s));
-    }
 }
 
 /** Bytes from the array's begin. */
@@ -275,7 +281,8 @@ static uint16_t *put_long(uint16_t *at, uint16_t low, uint16_t high)
     return at;
 }
 
-void scope_put(const scope_t *s, void *record)
+/** What the scope has done, as it stands in a frame. @param record at an even address, with room for thirty bytes */
+static void scope_put(const scope_t *s, void *record)
 {
     uint16_t *at = put_long(record, (uint16_t)((s->mode & 0xFF) | (s->channels << 8)), (uint16_t)((s->periods != 0u) ? s->periods - 1u : 0u));
     uint16_t used = offset_of(s->last), next = offset_of(s->at);

@@ -149,7 +149,8 @@ static void judge_flash(uint16_t crc)
     }
 }
 
-uint16_t selftest_flash(void)
+/** One slice of the flash's CRC. @return not 0 at the flash's end */
+static uint16_t selftest_flash(void)
 {
     uint16_t at = flash_at, crc = flash_crc, left;
     TBLPAG = 0;

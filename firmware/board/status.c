@@ -96,8 +96,8 @@ int16_t status_rpm(speed_erpm_t speed)
 /** The line's text. @return its end */
 static char *put_line(void)
 {
-    char *at = mode_status_line(sent_line, &board_drive);
-    if (at == sent_line && !mode_speaks(&at)) {
+    char *at = sent_line;
+    if (!mode_speaks(&at)) {
         at = text_put_named(at, "state ", (int16_t)board_drive.state);
         at = text_put_fault(at, " fault ", board_drive.fault);
         at = text_put_named(at, " speed ", status_rpm(estimator_speed(&board_drive.run.estimator)));
@@ -221,18 +221,13 @@ char *text_put_unsigned(char *at, uint16_t number)
     return text_put(at, digit);
 }
 
-char *text_put_signed(char *at, int16_t number)
+char *text_put_named(char *at, const char *name, int16_t number)
 {
-    char *next = at;
+    char *next = text_put(at, name);
     if (number < 0) {
         *next++ = '-';
     }
     return text_put_unsigned(next, (uint16_t)qm_abs(number));
-}
-
-char *text_put_named(char *at, const char *name, int16_t number)
-{
-    return text_put_signed(text_put(at, name), number);
 }
 
 const char *text_next(const char *name)

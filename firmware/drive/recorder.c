@@ -4,6 +4,16 @@
 #include "drive/drive.h"
 
 #define RECORDER_FIRST ((int16_t)((RECORDER_PLACES - 1) * RECORDER_BYTES)) /**< bytes before the first row that is written */
+#define RECORDER_CHECK 0x5Eu
+
+/** From now on a new record. */
+static void recorder_begin(recorder_t *r)
+{
+    drive_zero(r, sizeof *r); /* the test of the RAM reads it all */
+    r->check = RECORDER_CHECK;
+    r->next = RECORDER_FIRST;
+    r->left = RECORDER_AFTER + 1u; /* last: from now on the slow work writes */
+}
 
 void recorder_background(recorder_t *r, const drive_t *d)
 {
@@ -87,16 +97,6 @@ void recorder_write(recorder_t *r, const drive_t *d, int16_t i_a, int16_t i_b, i
 #ifdef MODE_WITHOUT_RECORDER
 #pragma message(MODE_WITHOUT_RECORDER " takes the fault recorder's place in RAM: this build has no recorder, whatever RECORDER_PERIODS says")
 #endif
-
-#define RECORDER_CHECK 0x5Eu
-
-void recorder_begin(recorder_t *r)
-{
-    drive_zero(r, sizeof *r); /* the test of the RAM reads it all */
-    r->check = RECORDER_CHECK;
-    r->next = RECORDER_FIRST;
-    r->left = RECORDER_AFTER + 1u; /* last: from now on the slow work writes */
-}
 
 /** Whether a reset has left a recorder and no chance content of RAM. */
 static uint16_t recorder_is_valid(const recorder_t *r)

@@ -17,7 +17,8 @@ uint16_t drive_may_follow(uint16_t state, drive_state_t next)
     return (uint16_t)(state < (uint16_t)DRIVE_STATE_COUNT && ((may_follow[state] >> (uint16_t)next) & 1u) != 0u);
 }
 
-INLINE void states_write(drive_t *d, drive_state_t next)
+/** The one place that writes the state. */
+static INLINE void states_write(drive_t *d, drive_state_t next)
 {
     d->state = (uint16_t)next;
     SELFTEST_KEEP(d, state, next);

@@ -47,24 +47,11 @@ typedef struct {
 } scope_t;
 
 #if SCOPE
-/** A row that is not the usual one: any length, whatever it costs. */
-void scope_record_unusual(scope_t *s);
-
 /** The last work of a period. @param begin of the array */
 void scope_tick(scope_t *s, int16_t *begin);
 
 /** Rows go here. */
 extern int16_t board_scope_array[SCOPE_ARRAY_WORDS];
-
-/** Nothing has been recorded. */
-void scope_init(scope_t *s);
-
-/** A request to record, as it stands in a frame: state, channels, periods between rows, channels, trigger. Without channels the scope stops.
- *  @return 1 if it was understood; in any case a running record has ended. 0: the array is empty until the next good request, or device info */
-uint16_t scope_start(scope_t *s, const uint8_t *request, uint16_t size);
-
-/** What the scope has done, as it stands in a frame. @param record at an even address, with room for thirty bytes */
-void scope_put(const scope_t *s, void *record);
 #endif
 
 /* ---- The memory that a client on the serial line may see, by 16-bit addresses: the chip's own; on a PC the window of tools/cpu_host ---- */
@@ -83,12 +70,6 @@ extern uint16_t _SP_init; /* the linker's: its address is where the variables en
 #define MEMORY_AT(address) ((volatile void *)(host_window() + ((address)-MEMORY_RAM_START)))
 #define MEMORY_ADDRESS(pointer) ((uint16_t)((const volatile uint8_t *)(pointer)-host_window() + (ptrdiff_t)MEMORY_RAM_START))
 #endif
-
-/** 1 if all of these bytes are RAM: nothing else may be read, for reading a register may act. What is below wraps to beyond the end. */
-uint16_t memory_is_ram(uint16_t address, uint16_t bytes);
-
-/** 1 if all of these bytes of RAM are variables: no stack. */
-uint16_t memory_is_variable(uint16_t address, uint16_t bytes);
 
 /* ---- LNet, the protocol of X2C-Scope clients, on the serial line: answers frames, reads and writes memory, runs the scope (docs/scope.md) ---- */
 

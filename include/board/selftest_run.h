@@ -42,9 +42,6 @@ void selftest_ms(void);
 /** The processor's registers. With interrupts off; leaves level 7. */
 void selftest_cpu(void);
 
-/** One slice of the flash's CRC. @return not 0 at the flash's end */
-uint16_t selftest_flash(void);
-
 /** Status line: " selftest 3" after a failure, the code of SELFTEST_TABLE. @return the text's end */
 char *selftest_put(char *at);
 

@@ -27,7 +27,6 @@ int16_t status_rpm(speed_erpm_t speed);
 /** Each writes from `at` on, without a closing zero, and returns where the next text goes. The caller has room. */
 char *text_put(char *at, const char *text);
 char *text_put_unsigned(char *at, uint16_t number);
-char *text_put_signed(char *at, int16_t number);
 
 /** The line's end. */
 char *text_end(char *at);

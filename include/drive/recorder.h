@@ -60,9 +60,6 @@ typedef struct {
  *  @param powered_up RAM holds anything @param fault that the drive starts with */
 void recorder_restart(recorder_t *r, uint16_t powered_up, drive_fault_t fault);
 
-/** From now on a new record. */
-void recorder_begin(recorder_t *r);
-
 /** A pass of the background: a start begins a new record, which has the offsets of its run. */
 void recorder_background(recorder_t *r, const drive_t *d);
 

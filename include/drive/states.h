@@ -120,9 +120,6 @@ void drive_enter(drive_t *d, drive_state_t next);
  *  @return 1 when the outputs must be off */
 uint16_t drive_latch_fault(drive_t *d);
 
-/** The one place that writes the state; for states.c alone. */
-void states_write(drive_t *d, drive_state_t next);
-
 /** Stops at once and keeps the code of the first fault. Any context: background, interrupt, trap. */
 void drive_raise(drive_t *d, drive_fault_t fault);
 

@@ -79,10 +79,10 @@ def test_a_source_includes_its_own_header_first() -> None:
 PREFIXES = {
     "app/panel": "app panel",
     "board/main": "main",
-    "board/modes/mode_board": "bringup identify mode",
+    "board/modes/mode_board": "mode",
     "board/peripherals": "adc clock pins pwm timer uart",
     "board/selftest_cpu": "board",
-    "board/scope": "lnet memory scope",
+    "board/scope": "lnet scope",
     "board/status": "record status text",
     "control/current_control": "current pi vd voltage vq",
     "control/motor_model": "adaptation fieldweak salience",

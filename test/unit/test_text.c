@@ -31,7 +31,7 @@ void test_texts_and_numbers_end_where_the_next_one_begins(void)
             memset(buffer, '#', sizeof buffer);
         }
         if (cases[n].number <= INT16_MAX) {
-            expect_text(cases[n].text, buffer, text_put_signed(buffer, (int16_t)cases[n].number));
+            expect_text(cases[n].text, buffer, text_put_named(buffer, "", (int16_t)cases[n].number));
         }
     }
 }

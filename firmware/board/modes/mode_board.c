@@ -9,15 +9,6 @@
 
 #include <xc.h>
 
-char *mode_status_line(char *line, const drive_t *d UNUSED)
-{
-#ifdef IDENTIFY
-    return identify_status_line(line, d);
-#else
-    return line;
-#endif
-}
-
 #ifdef TORQUE_PROFILE
 tProfileParm ProfileParm;
 
@@ -31,15 +22,6 @@ static void profile_watch(const profile_t *f)
     }
 }
 #endif
-
-void mode_watch(const drive_t *d UNUSED)
-{
-#ifdef IDENTIFY
-    identify_watch(d);
-#elif defined TORQUE_PROFILE
-    profile_watch(&d->run.profile);
-#endif
-}
 
 #ifdef IDENTIFY
 tIdentifyParm IdentifyParm;
@@ -67,7 +49,9 @@ static char *put_decimal(char *at, const char *before, uint32_t number)
     return next;
 }
 
-char *identify_status_line(char *line, const drive_t *d)
+/** "step 0 DONE fault NONE R 2692100 uohm Ld 1919400 nH Lq 1920100 nH Kphi 7240300 uV/krpm J 5500e-9 kgm2 friction
+ *  400000e-8 Nm + 15300e-9 Nms" in one line. @return its end */
+static char *identify_line(char *line, const drive_t *d)
 {
     static const char *const results[] = { IDENTIFY_RESULT_TABLE(IDENTIFY_RESULT_NAME) };
     const identify_t *id = &d->run.identify;
@@ -82,7 +66,7 @@ char *identify_status_line(char *line, const drive_t *d)
     return text_put(put_decimal(at, "e-8 Nm + ", id->values.viscous_1e9_nms), "e-9 Nms\r\n");
 }
 
-void identify_watch(const drive_t *d)
+static void identify_watch(const drive_t *d)
 {
     const identify_t *id = &d->run.identify;
     IdentifyParm.step = id->step;
@@ -97,13 +81,12 @@ void identify_watch(const drive_t *d)
 }
 #endif
 
-uint16_t mode_speaks(char **end UNUSED)
+void mode_watch(const drive_t *d UNUSED)
 {
-#ifdef BRINGUP
-    *end = bringup_line(*end);
-    return 1;
-#else
-    return 0;
+#ifdef IDENTIFY
+    identify_watch(d);
+#elif defined TORQUE_PROFILE
+    profile_watch(&d->run.profile);
 #endif
 }
 
@@ -237,7 +220,8 @@ static void choose_sender(uint16_t sender)
     __builtin_write_OSCCONL(OSCCON | 0x0040u);
 }
 
-char *bringup_line(char *line)
+/** The guide's next line, if it has one: "ask 4 ...", "ok BUS ...", "WRONG BUS ...", "FIX BUS_DIVIDER: ...". @return its end */
+static char *bringup_line(char *line)
 {
     bringup_message_t *m = &board_bringup.message;
     char *at = line;
@@ -254,6 +238,19 @@ char *bringup_line(char *line)
     return text_put(at, "\r\n");
 }
 #endif
+
+uint16_t mode_speaks(char **end UNUSED)
+{
+#if defined IDENTIFY
+    *end = identify_line(*end, &board_drive);
+    return 1;
+#elif defined BRINGUP
+    *end = bringup_line(*end);
+    return 1;
+#else
+    return 0;
+#endif
+}
 
 void mode_record(void)
 {

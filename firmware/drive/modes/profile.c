@@ -52,7 +52,8 @@ QM_WRAPS void profile_learn(profile_t *f, const profile_params_t *p, angle_t sha
     f->next = (uint16_t)((order < PROFILE_ORDERS) ? order : 0u);
 }
 
-void profile_fade(profile_t *f, uint16_t shift)
+/** All that was learned fades by 2^-shift. */
+static void profile_fade(profile_t *f, uint16_t shift)
 {
     uint16_t k;
     for (k = 0; k < PROFILE_ORDERS; k++) { /* wcet: at most 2 turns */

@@ -18,13 +18,6 @@ typedef struct {
 } tIdentifyParm;
 
 extern tIdentifyParm IdentifyParm;
-
-/** "step 0 DONE fault NONE R 2692100 uohm Ld 1919400 nH Lq 1920100 nH Kphi 7240300 uV/krpm J 5500e-9 kgm2 friction
- *  400000e-8 Nm + 15300e-9 Nms" in one line. @return its end */
-char *identify_status_line(char *line, const drive_t *d);
-
-/** Copies what has been measured to IdentifyParm. */
-void identify_watch(const drive_t *d);
 #endif
 
 #ifdef TORQUE_PROFILE
@@ -46,9 +39,6 @@ extern tProfileParm ProfileParm;
 #define MODE_LINE_SIZE 144
 #endif
 
-/** The mode's status line. @return its end; the line itself without the mode */
-char *mode_status_line(char *line, const drive_t *d);
-
 /** Refreshes the mode's watch variable. */
 void mode_watch(const drive_t *d);
 
@@ -57,9 +47,6 @@ void mode_watch(const drive_t *d);
 #ifdef BRINGUP
 /** Steps, answers, measurements. */
 extern bringup_guide_t board_bringup;
-
-/** The guide's next line, if it has one: "ask 4 ...", "ok BUS ...", "WRONG BUS ...", "-> BUS_DIVIDER: ...". @return its end */
-char *bringup_line(char *line);
 
 #define MODE_STATUS_MS 1u /* the guide waits for its lines */
 #else

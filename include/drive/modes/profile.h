@@ -84,9 +84,6 @@ void profile_follow(profile_t *f, const profile_params_t *p, speed_erpm_t speed)
 /** A harmonic learns what the speed controller has to ask for at this angle, and leaks. @param error_q16 Kp times the speed's error, counts * 8, within error_most_q16 */
 void profile_learn(profile_t *f, const profile_params_t *p, angle_t shaft, int16_t error_q16);
 
-/** All that was learned fades by 2^-shift. */
-void profile_fade(profile_t *f, uint16_t shift);
-
 /** The learned current at this angle. */
 current_q13_t profile_current(const profile_t *f, const profile_params_t *p, angle_t shaft);
 #else
