@@ -136,10 +136,7 @@ void estimator_filter_speed(estimator_t *e, const estimator_params_t *p)
  *  half step from the sample to the middle of the last period, so that no second sine is needed. */
 static INLINE dq_t estimator_in_control_frame(const estimator_t *e, alphabeta_t e_q13, sincos_t frame)
 {
-    dq_t at_sample = park(e_q13, frame), at_middle;
-    at_middle.d = (int16_t)(at_sample.d - qm_mulhi(at_sample.q, e->half_step_q16_rad));
-    at_middle.q = (int16_t)(at_sample.q + qm_mulhi(at_sample.d, e->half_step_q16_rad));
-    return at_middle;
+    return dq_turn(park(e_q13, frame), e->half_step_q16_rad);
 }
 
 void estimator_turn_frame(estimator_t *e)

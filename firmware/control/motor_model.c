@@ -29,10 +29,7 @@ void adaptation_learn(adaptation_t *a, const adaptation_params_t *p, dq_t emf_q1
 
 int16_t adaptation_kfi(int32_t kfi)
 {
-    if (kfi > 32767) {
-        return 32767;
-    }
-    return (int16_t)((kfi < ADAPTATION_KFI_LEAST) ? ADAPTATION_KFI_LEAST : kfi);
+    return qm_within(kfi, ADAPTATION_KFI_LEAST, 32767);
 }
 
 /** 1/Kphi of the table with its change. */

@@ -130,7 +130,7 @@ QM_INLINE int16_t qm_clamp(int16_t x, int16_t low, int16_t high)
     return (x < low) ? low : x;
 }
 
-/** A sum within a word, limited to low..high. */
+/** A sum limited to low..high, and so to a word. */
 QM_INLINE int16_t qm_within(int32_t x, int16_t low, int16_t high)
 {
     return (int16_t)((x > high) ? high : (x < low) ? low
@@ -189,11 +189,7 @@ QM_INLINE int16_t qm_mean(int16_t a, int16_t b)
 /** a - b, limited to half the int16 range so that it can be summed again without overflow. */
 QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
 {
-    const int32_t difference = (int32_t)a - b;
-    if (difference > 16383) {
-        return 16383;
-    }
-    return (int16_t)((difference < -16383) ? -16383 : difference);
+    return qm_within((int32_t)a - b, -16383, 16383);
 }
 
 /** x * 2^bits; the caller proves that it fits. @param bits 0..15 */

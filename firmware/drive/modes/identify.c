@@ -398,11 +398,7 @@ static uint32_t turn_speed(const drive_t *d, const drive_params_t *p)
 /** Mean of a stretch, within what root_length() can square. */
 static int16_t emf_mean(int32_t sum)
 {
-    int32_t mean = sum >> BLOCK_LOG2;
-    if (mean > 23170) {
-        return 23170;
-    }
-    return (int16_t)((mean < -23170) ? -23170 : mean);
+    return qm_within(sum >> BLOCK_LOG2, -23170, 23170);
 }
 
 /** Means of one stretch, back-EMF e = v - R i - j w Ld i: with the current along the rotor, as without load, Lq has no say. The
