@@ -8,7 +8,6 @@
 #include "drive/scaling/controllers.h"
 #include "drive/scaling/current_voltage.h"
 #include "drive/scaling/estimator.h"
-#include "drive/scaling/load_observer.h"
 #include "drive/scaling/machine.h"
 
 #endif

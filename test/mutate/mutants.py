@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import c_tokens
 
 # Files whose macros are computations or register values; elsewhere a macro is a name or a table.
-SCALING_FILES = (*(f"include/drive/scaling/{name}.h" for name in ("controllers", "current_voltage", "estimator", "load_observer", "machine")),
+SCALING_FILES = (*(f"include/drive/scaling/{name}.h" for name in ("controllers", "current_voltage", "estimator", "machine")),
                  "include/drive/param_init.h")
 MACRO_FILES = (*SCALING_FILES, "include/board/mclv.h")
 # A constant of a long table is one of many alike: this many of a table are enough, and more would flatter the score.
