@@ -2,7 +2,6 @@
 #include "drive/modes/bringup.h"
 
 #include "drive/drive.h"
-#include "drive/modes/bringup_steps.h"
 
 #ifdef BRINGUP
 #define BRINGUP_FILTER_SHIFT 5                   /* 1.6 ms: four counts of the amplitude */
@@ -234,14 +233,6 @@ uint16_t bringup_bus_10mv(const drive_t *d)
 
 #define CURRENT_MS 60000u /* patience while current flows */
 
-static void step_last(bringup_guide_t *g, drive_t *d)
-{
-    d->command.run = 0;
-    bringup_say(g, BRINGUP_ENDS, 0, 0);
-    g->message.value = (int32_t)g->found;
-    bringup_go(g, BRINGUP_STEP_END);
-}
-
 void bringup_init(bringup_guide_t *g)
 {
     g->message.kind = (uint16_t)BRINGUP_SILENT;
@@ -259,50 +250,14 @@ void bringup_init(bringup_guide_t *g)
     bringup_go(g, BRINGUP_STEP_BEGIN);
 }
 
-/** The steps that let current flow, and those after them. */
-static void step_with_current(bringup_guide_t *g, drive_t *d, const drive_params_t *p)
-{
-    switch (g->step) {
-    case BRINGUP_STEP_DRIVE: bringup_step_drive(g, d, p); break;
-    case BRINGUP_STEP_SHOW: bringup_step_show(g, d); break;
-    case BRINGUP_STEP_WIRING: bringup_step_wiring(g); break;
-    case BRINGUP_STEP_BRIDGE: bringup_step_bridge(g, d); break;
-    case BRINGUP_STEP_AMMETER: bringup_step_ammeter(g, d, p); break;
-    case BRINGUP_STEP_GAINS: bringup_step_gains(g); break;
-    case BRINGUP_STEP_DIRECTION: bringup_step_direction(g, d); break;
-    case BRINGUP_STEP_MARK: bringup_step_mark(g, d); break;
-    case BRINGUP_STEP_TURNS: bringup_step_turns(g, d); break;
-    case BRINGUP_STEP_LAST: step_last(g, d); break;
-    default: /* END: S2 begins anew */
-        if (g->button == 2u) {
-            bringup_init(g);
-        }
-        break;
-    }
-}
+#define BRINGUP_STEP_CALL(name, call) \
+    case BRINGUP_STEP_##name: (call); break;
 
 static void take_step(bringup_guide_t *g, drive_t *d, const drive_params_t *p, const buttons_t *in, int16_t pot_q15)
 {
     switch (g->step) {
-    case BRINGUP_STEP_BEGIN: bringup_step_begin(g, in); break;
-    case BRINGUP_STEP_S3: bringup_step_s3(g); break;
-    case BRINGUP_STEP_UART: bringup_step_uart(g); break;
-    case BRINGUP_STEP_LED_ALIVE: bringup_step_led(g, 0); break;
-    case BRINGUP_STEP_LED_ALIVE_OTHER: bringup_step_led_other(g, 0); break;
-    case BRINGUP_STEP_LED_RUN: bringup_step_led(g, 1); break;
-    case BRINGUP_STEP_LED_RUN_OTHER: bringup_step_led_other(g, 1); break;
-    case BRINGUP_STEP_POT_LEFT: bringup_step_pot_end(g, pot_q15, 0); break;
-    case BRINGUP_STEP_POT_RIGHT: bringup_step_pot_end(g, pot_q15, 1); break;
-    case BRINGUP_STEP_POT: bringup_step_pot(g); break;
-    case BRINGUP_STEP_BUS: bringup_step_bus(g, d); break;
-    case BRINGUP_STEP_OFFSETS: bringup_step_rest(g, d, 0); break;
-    case BRINGUP_STEP_NOISES: bringup_step_rest(g, d, 1); break;
-    case BRINGUP_STEP_SIGNALS: bringup_step_signals(g, d, p); break;
-    case BRINGUP_STEP_FAULT_REST: bringup_step_fault_rest(g, d); break;
-    case BRINGUP_STEP_FAULT_INPUT: bringup_step_fault_input(g, d); break;
-    case BRINGUP_STEP_FAULT_OPEN: bringup_step_fault_open(g, d); break;
-    case BRINGUP_STEP_CURRENT: bringup_step_current(g, d); break;
-    default: step_with_current(g, d, p); break;
+        BRINGUP_STEP_TABLE(BRINGUP_STEP_CALL)
+    default: break; /* there is no other */
     }
 }
 

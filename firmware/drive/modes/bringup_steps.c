@@ -1,5 +1,5 @@
 /* BRINGUP, the steps in their order: panel, rest, currents in six directions, gains, turns of the shaft. */
-#include "drive/modes/bringup_steps.h"
+#include "drive/modes/bringup.h"
 
 #include "drive/drive.h"
 
@@ -501,5 +501,20 @@ void bringup_step_turns(bringup_guide_t *g, drive_t *d)
         return;
     }
     bringup_go(g, BRINGUP_STEP_LAST);
+}
+
+void bringup_step_last(bringup_guide_t *g, drive_t *d)
+{
+    d->command.run = 0;
+    bringup_say(g, BRINGUP_ENDS, 0, 0);
+    g->message.value = (int32_t)g->found;
+    bringup_go(g, BRINGUP_STEP_END);
+}
+
+void bringup_step_end(bringup_guide_t *g)
+{
+    if (g->button == 2u) {
+        bringup_init(g);
+    }
 }
 #endif

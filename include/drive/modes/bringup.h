@@ -207,39 +207,39 @@ typedef struct {
 
 #define BRINGUP_LINES_BOTH 2u /* not one of the two pins, but both */
 
-/** X(name): steps in their order. */
+/** X(name, call): steps in their order, and what each does in a pass: panel, rest, currents in six directions, gains, turns of the shaft. */
 #define BRINGUP_STEP_TABLE(X) \
-    X(BEGIN) \
-    X(S3) \
-    X(UART) \
-    X(LED_ALIVE) \
-    X(LED_ALIVE_OTHER) \
-    X(LED_RUN) \
-    X(LED_RUN_OTHER) \
-    X(POT_LEFT) \
-    X(POT_RIGHT) \
-    X(POT) \
-    X(BUS) \
-    X(OFFSETS) \
-    X(NOISES) \
-    X(SIGNALS) \
-    X(FAULT_REST) \
-    X(FAULT_INPUT) \
-    X(FAULT_OPEN) \
-    X(CURRENT) \
-    X(DRIVE) \
-    X(SHOW) \
-    X(WIRING) \
-    X(BRIDGE) \
-    X(AMMETER) \
-    X(GAINS) \
-    X(DIRECTION) \
-    X(MARK) \
-    X(TURNS) \
-    X(LAST) \
-    X(END)
+    X(BEGIN, bringup_step_begin(g, in)) \
+    X(S3, bringup_step_s3(g)) \
+    X(UART, bringup_step_uart(g)) \
+    X(LED_ALIVE, bringup_step_led(g, 0)) \
+    X(LED_ALIVE_OTHER, bringup_step_led_other(g, 0)) \
+    X(LED_RUN, bringup_step_led(g, 1)) \
+    X(LED_RUN_OTHER, bringup_step_led_other(g, 1)) \
+    X(POT_LEFT, bringup_step_pot_end(g, pot_q15, 0)) \
+    X(POT_RIGHT, bringup_step_pot_end(g, pot_q15, 1)) \
+    X(POT, bringup_step_pot(g)) \
+    X(BUS, bringup_step_bus(g, d)) \
+    X(OFFSETS, bringup_step_rest(g, d, 0)) \
+    X(NOISES, bringup_step_rest(g, d, 1)) \
+    X(SIGNALS, bringup_step_signals(g, d, p)) \
+    X(FAULT_REST, bringup_step_fault_rest(g, d)) \
+    X(FAULT_INPUT, bringup_step_fault_input(g, d)) \
+    X(FAULT_OPEN, bringup_step_fault_open(g, d)) \
+    X(CURRENT, bringup_step_current(g, d)) \
+    X(DRIVE, bringup_step_drive(g, d, p)) \
+    X(SHOW, bringup_step_show(g, d)) \
+    X(WIRING, bringup_step_wiring(g)) \
+    X(BRIDGE, bringup_step_bridge(g, d)) \
+    X(AMMETER, bringup_step_ammeter(g, d, p)) \
+    X(GAINS, bringup_step_gains(g)) \
+    X(DIRECTION, bringup_step_direction(g, d)) \
+    X(MARK, bringup_step_mark(g, d)) \
+    X(TURNS, bringup_step_turns(g, d)) \
+    X(LAST, bringup_step_last(g, d)) \
+    X(END, bringup_step_end(g))
 
-#define BRINGUP_STEP_ENUM(name) BRINGUP_STEP_##name,
+#define BRINGUP_STEP_ENUM(name, call) BRINGUP_STEP_##name,
 
 typedef enum { BRINGUP_STEP_TABLE(BRINGUP_STEP_ENUM) BRINGUP_STEPS } bringup_step_t;
 
@@ -318,6 +318,83 @@ uint16_t bringup_has_tripped(bringup_guide_t *g, const drive_t *d);
 
 /** The bus voltage. */
 uint16_t bringup_bus_10mv(const drive_t *d);
+
+/* ---- The steps (bringup_steps.c): what each does in a pass ---- */
+
+/** Says by which pin of the serial line it speaks, by one and the other in turn, until a button comes. */
+void bringup_step_begin(bringup_guide_t *g, const buttons_t *in);
+
+/** The other button: S3, unless both have changed places. */
+void bringup_step_s3(bringup_guide_t *g);
+
+/** Which of the two pins the user's line came by. */
+void bringup_step_uart(bringup_guide_t *g);
+
+/** One LED is lit: is it the right one? @param led 0: ALIVE, 1: RUN */
+void bringup_step_led(bringup_guide_t *g, uint16_t led);
+
+/** It is not: is the other one lit, or none? @param led 0: ALIVE, 1: RUN */
+void bringup_step_led_other(bringup_guide_t *g, uint16_t led);
+
+/** The user turns the potentiometer to an end. @param pot_q15 signed fractional @param right 0: left */
+void bringup_step_pot_end(bringup_guide_t *g, int16_t pot_q15, uint16_t right);
+
+/** Judges both ends. */
+void bringup_step_pot(bringup_guide_t *g);
+
+/** The supply as it is measured, against NOMINAL_BUS_V. */
+void bringup_step_bus(bringup_guide_t *g, const drive_t *d);
+
+/** Means of both current signals first, then how far their samples are off them. @param noises 1: the second time */
+void bringup_step_rest(bringup_guide_t *g, drive_t *d, uint16_t noises);
+
+/** Judges offset and noise of both signals. */
+void bringup_step_signals(bringup_guide_t *g, const drive_t *d, const drive_params_t *p);
+
+/** The fault input is high at rest. */
+void bringup_step_fault_rest(bringup_guide_t *g, drive_t *d);
+
+/** It trips when the user pulls it low ... */
+void bringup_step_fault_input(bringup_guide_t *g, const drive_t *d);
+
+/** ... and is high again afterwards. */
+void bringup_step_fault_open(bringup_guide_t *g, drive_t *d);
+
+/** The user lets current flow, or ends it. */
+void bringup_step_current(bringup_guide_t *g, const drive_t *d);
+
+/** Half the current, all of it, none, in one direction after the other. A press ends it. */
+void bringup_step_drive(bringup_guide_t *g, drive_t *d, const drive_params_t *p);
+
+/** Shows what was measured, a line for each direction. */
+void bringup_step_show(bringup_guide_t *g, const drive_t *d);
+
+/** What is wrong with wires, transistors, signals. */
+void bringup_step_wiring(bringup_guide_t *g);
+
+/** Gain of B against A, resistance, dead time. */
+void bringup_step_bridge(bringup_guide_t *g, const drive_t *d);
+
+/** Current along phase A, which the user compares with an ammeter. A press before the question ends it. */
+void bringup_step_ammeter(bringup_guide_t *g, drive_t *d, const drive_params_t *p);
+
+/** What the ammeter and the resistance say of the gains. */
+void bringup_step_gains(bringup_guide_t *g);
+
+/** Turns forward by electrical turns. */
+void bringup_step_direction(bringup_guide_t *g, drive_t *d);
+
+/** Stands, so that the user can mark the shaft. */
+void bringup_step_mark(bringup_guide_t *g, drive_t *d);
+
+/** Turns until the mark is back, and counts. */
+void bringup_step_turns(bringup_guide_t *g, drive_t *d);
+
+/** Says how many findings there are; the motor is off. */
+void bringup_step_last(bringup_guide_t *g, drive_t *d);
+
+/** S2 begins anew. */
+void bringup_step_end(bringup_guide_t *g);
 #endif
 
 #endif
