@@ -1,12 +1,21 @@
 /* The application of the MCLV board: S2 starts, stops and clears a fault, S3 changes the range, the potentiometer is the target. */
-#include "app/panel.h"
+#include "app/app.h"
 
 #define PANEL_BLINK_MS 250u
 #define PANEL_PAUSE_MS 1500u
 
+/** State of the panel. */
+typedef struct {
+    button_t s2, s3;
+    int16_t fast_range; /**< S3: NOMINAL..MAXIMUM instead of MINIMUM..NOMINAL */
+    int16_t kept;       /**< its complement: a flipped bit would change the speed */
+    uint16_t blink_ms;
+} panel_t;
+
 static panel_t app_panel;
 
-void panel_init(panel_t *panel)
+/** Nothing pressed, low range. */
+static void panel_init(panel_t *panel)
 {
     static const panel_t fresh = { .kept = -1 };
     *panel = fresh;
@@ -44,7 +53,8 @@ static uint16_t panel_lights(panel_t *panel, const app_told_t *told)
     return (uint16_t)((lit ? (uint16_t)APP_LED_ALIVE : 0u) | (told->is_running ? (uint16_t)APP_LED_RUN : 0u));
 }
 
-void panel_tick(panel_t *panel, const app_told_t *told, app_asks_t *asks)
+/** A pass. S2 in a fault only clears the fault; else it starts and stops. S3 changes the range of a running motor. */
+static void panel_tick(panel_t *panel, const app_told_t *told, app_asks_t *asks)
 {
     if (panel->fast_range != ~panel->kept) {
         asks->fault = (uint16_t)FAULT_APPLICATION;

@@ -20,9 +20,9 @@ void test_the_potentiometer_at_its_end_asks_for_a_count_in_the_direction_of_the_
     app_asks_t asks = { 0 };
     told.pot_q16 = 0;
     told.towards = -1;
-    panel_tick(&the_panel, &told, &asks);
+    panel_tick(&app_panel, &told, &asks);
     TEST_ASSERT_EQUAL_INT16(-1, asks.target_erpm); /* 0 would turn a reverse run round */
     told.pot_q16 = 65535;
-    panel_tick(&the_panel, &told, &asks);
+    panel_tick(&app_panel, &told, &asks);
     TEST_ASSERT_INT16_WITHIN(1, -5120, asks.target_erpm);
 }

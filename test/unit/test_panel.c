@@ -11,17 +11,17 @@ void setUp(void)
 void test_init_forgets_everything_and_puts_the_pot_at_its_lower_end(void)
 {
     static const buttons_t nothing = { 0, 0, 1 };
-    the_panel.s2.down_ms = 29;
-    the_panel.s3.down_ms = 29;
+    app_panel.s2.down_ms = 29;
+    app_panel.s3.down_ms = 29;
     the_request.wish_run = 1;
-    the_panel.fast_range = 1;
-    the_panel.blink_ms = 999;
+    app_panel.fast_range = 1;
+    app_panel.blink_ms = 999;
     panel_reset();
-    TEST_ASSERT_EQUAL_UINT16(0, the_panel.s2.down_ms);
-    TEST_ASSERT_EQUAL_UINT16(0, the_panel.s3.down_ms);
+    TEST_ASSERT_EQUAL_UINT16(0, app_panel.s2.down_ms);
+    TEST_ASSERT_EQUAL_UINT16(0, app_panel.s3.down_ms);
     TEST_ASSERT_EQUAL_INT16(0, the_request.wish_run);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
-    TEST_ASSERT_EQUAL_UINT16(0, the_panel.blink_ms);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
+    TEST_ASSERT_EQUAL_UINT16(0, app_panel.blink_ms);
     the_pot.now_q15 = -32768;
     panel_pass(&params, &nothing);
     TEST_ASSERT_INT16_WITHIN(6, 2500, drive.command.target_erpm);
@@ -165,21 +165,21 @@ void test_S2_while_stopping_runs_on_at_once(void)
 void test_S3_changes_the_range_only_while_running_and_every_start_begins_in_the_low_range(void)
 {
     press_s3(50);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
     press_s2(50);
     press_s3(29);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
     press_s3(50);
-    TEST_ASSERT_EQUAL_INT16(1, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(1, app_panel.fast_range);
     TEST_ASSERT_INT16_WITHIN(15, 14000, drive.command.target_erpm);
     press_s3(50);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
     TEST_ASSERT_INT16_WITHIN(15, 2500, drive.command.target_erpm);
     press_s3(50);
     press_s2(50);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
     press_s2(50);
-    TEST_ASSERT_EQUAL_INT16(0, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(0, app_panel.fast_range);
 }
 
 /* ---- potentiometer ---- */
@@ -379,13 +379,13 @@ void test_a_flipped_bit_of_the_wish_or_of_the_range_shows_and_a_wish_does_not(vo
     uint16_t bit;
     for (bit = 0; bit < 64u; bit++) {
         const uint16_t is_range = (uint16_t)(bit & 16u);
-        int16_t *word = is_range ? &the_panel.fast_range : &the_request.wish_run;
+        int16_t *word = is_range ? &app_panel.fast_range : &the_request.wish_run;
         panel_reset();
         rig_ready();
         if (bit >= 32u) {
             press_s2(100);
             press_s3(100);
-            TEST_ASSERT_TRUE(the_request.wish_run == 1 && the_panel.fast_range == 1);
+            TEST_ASSERT_TRUE(the_request.wish_run == 1 && app_panel.fast_range == 1);
         }
         TEST_ASSERT_EQUAL_UINT16(1, request_holds(&the_request));
         *word = (int16_t)(*word ^ (int16_t)(1u << (bit & 15u)));

@@ -246,8 +246,8 @@ void test_the_fast_range_is_kept(void)
 {
     run();
     press_s3(40);
-    TEST_ASSERT_EQUAL_INT16(1, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(1, app_panel.fast_range);
     fault(FAULT_STALL);
     (void)ms_to_restart(5000);
-    TEST_ASSERT_EQUAL_INT16(1, the_panel.fast_range);
+    TEST_ASSERT_EQUAL_INT16(1, app_panel.fast_range);
 }

@@ -71,13 +71,11 @@ def test_a_source_includes_its_own_header_first() -> None:
     without = {f"firmware/{name}.c" for name in ("board/app_calls", "board/isr", "board/main", "drive/modes/bringup_steps", "drive/param_check", "drive/param_text")}
     own = {path: path.replace("firmware/", "").replace(".c", ".h") for path in sources() if path.startswith("firmware/")}
     assert {path for path, header in own.items() if f"include/{header}" not in sources() and "/app/" not in path} == without
-    own = {path: header for path, header in own.items() if not path.startswith("firmware/app/") or header == "app/panel.h"} # the others have none
-    wrong = [path for path, header in own.items() if path not in without and INCLUDE.findall(sources()[path])[0] != header]
+    wrong = [path for path, header in own.items() if path not in without and "/app/" not in path and INCLUDE.findall(sources()[path])[0] != header]
     assert not wrong, wrong
 
 
 PREFIXES = {
-    "app/panel": "app panel",
     "board/main": "main",
     "board/modes/mode_board": "mode",
     "board/peripherals": "adc clock pins pwm timer uart",
@@ -108,7 +106,7 @@ PREFIXES = {
 def test_a_functions_name_leads_to_its_file() -> None:
     for path, text in sources().items():
         if path.endswith(".c"):
-            known = ["app"] if path.startswith("firmware/app/") and "panel" not in path else PREFIXES.get(path.removeprefix("firmware/").removesuffix(".c"), path.rsplit("/", 1)[1].removesuffix(".c").split("_")[0]).split()
+            known = ["app"] if path.startswith("firmware/app/") else PREFIXES.get(path.removeprefix("firmware/").removesuffix(".c"), path.rsplit("/", 1)[1].removesuffix(".c").split("_")[0]).split()
             names = [name for name, before, _ in functions(text) if "static" not in before and "QM_INLINE" not in before and name[0] != "_" and not name.isupper()]
             wrong = [name for name in names if not f"{name}_".startswith(tuple(f"{prefix}_" for prefix in known))]
             unused = [prefix for prefix in known if names and not any(f"{name}_".startswith(f"{prefix}_") for name in names)]

@@ -4,10 +4,10 @@
 
 #include "drive_rig.h"
 
-#include "app/panel.h"
+#include "firmware/app/panel.c"
+
 #include "drive/request.h"
 
-static panel_t the_panel;
 static request_t the_request;
 static pot_t the_pot;
 static buttons_t inputs;
@@ -34,7 +34,7 @@ static inline void panel_pass(const drive_params_t *p, const buttons_t *in)
     const app_told_t told = panel_told(p, in);
     app_asks_t asks = { .run = request_stands(&the_request), .target_erpm = drive.command.target_erpm };
     asked_t asked;
-    panel_tick(&the_panel, &told, &asks);
+    panel_tick(&app_panel, &told, &asks);
     if (asks.fault != (uint16_t)FAULT_NONE) {
         drive_raise(&drive, (drive_fault_t)asks.fault);
     }
@@ -111,7 +111,7 @@ static inline void press_s3(uint16_t ms)
 static inline void panel_reset(void)
 {
     static const buttons_t nothing;
-    panel_init(&the_panel);
+    panel_init(&app_panel);
     request_init(&the_request);
     pot_init(&the_pot);
     inputs = nothing;
