@@ -240,9 +240,9 @@ static void pulse_is_over(uint16_t begin_200ns, uint16_t ticks)
 
 void app_pulse_init(void)
 {
-    clock_write_low((uint16_t)(OSCCON & ~0x0040u)); /* unlock the pin selection */
+    pins_unlock();
     RPINR7 = BOARD_RPINR7;
-    clock_write_low((uint16_t)(OSCCON | 0x0040u));
+    pins_lock();
     T3CON = 0;
     PR3 = 0xFFFFu;
     T3CON = BOARD_T3CON;

@@ -33,7 +33,8 @@ INLINE void pwm_outputs_off(void)
     P1OVDCON = BOARD_OUTPUTS_OFF;
 }
 
-void clock_write_low(uint16_t low)
+/** The lower byte of OSCCON: a request to switch the clock, the lock of the pin selection. */
+static void clock_write_low(uint16_t low)
 {
     __builtin_write_OSCCONL(low);
 }
@@ -66,6 +67,16 @@ uint16_t clock_init(void)
     return clock_switch(BOARD_NOSC_PRIPLL, BOARD_OSCCON_LOCK);
 }
 
+INLINE void pins_unlock(void)
+{
+    clock_write_low((uint16_t)(OSCCON & ~0x0040u));
+}
+
+INLINE void pins_lock(void)
+{
+    clock_write_low((uint16_t)(OSCCON | 0x0040u));
+}
+
 void pins_init(void)
 {
     AD1PCFGL = BOARD_AD1PCFGL;
@@ -80,11 +91,11 @@ void pins_init(void)
         CNPU2 = BOARD_CNPU2;
     }
 
-    clock_write_low((uint16_t)(OSCCON & ~0x0040u)); /* unlock the pin selection */
+    pins_unlock();
     RPINR12 = BOARD_FLTA_RP;
     RPINR18 = 0x1F00u | BOARD_UART_RX_RP; /* U1CTS stays without a pin */
     PIN_OUTPUT(BOARD_PIN_UART_TX) = BOARD_UART_TX_FUNCTION;
-    clock_write_low((uint16_t)(OSCCON | 0x0040u));
+    pins_lock();
 }
 
 void pwm_init(void)

@@ -7,8 +7,11 @@
 /** Starts the PLL and switches to it. @return 0, or 1 when it did not lock in a bounded time */
 uint16_t clock_init(void);
 
-/** The lower byte of OSCCON: a request to switch the clock, the lock of the pin selection. */
-void clock_write_low(uint16_t low);
+/** Opens the selection of remappable pins for changes. */
+void pins_unlock(void);
+
+/** Ends that. */
+void pins_lock(void);
 
 /** Pin directions, analogue pins, remappable inputs and outputs. */
 void pins_init(void);

@@ -22,9 +22,14 @@ static uint16_t is_high, measured, wrong;
 static app_told_t told;
 
 /* Instead of the other files'. */
-void clock_write_low(uint16_t low)
+void pins_unlock(void)
 {
-    OSCCON = low;
+    OSCCON &= (uint16_t)~0x0040u;
+}
+
+void pins_lock(void)
+{
+    OSCCON |= 0x0040u;
 }
 
 int16_t status_rpm(speed_erpm_t speed)

@@ -4,6 +4,7 @@
 #include "board/application.h"
 #include "board/firmware.h"
 #include "board/mclv.h"
+#include "board/peripherals.h"
 #include "board/pin_table.h"
 #include "board/status.h"
 
@@ -214,10 +215,10 @@ static char *put_finding(char *line, const bringup_message_t *m)
 /** The pins that the line goes out by. */
 static void choose_sender(uint16_t sender)
 {
-    __builtin_write_OSCCONL(OSCCON & ~0x0040u); /* as in pins_init() */
+    pins_unlock();
     PIN_OUTPUT(BOARD_PIN_UART_TX) = (sender != 1u) ? BOARD_UART_TX_FUNCTION : 0u;
     PIN_OUTPUT(BOARD_OTHER_TX) = (sender != 0u) ? BOARD_UART_TX_FUNCTION : 0u;
-    __builtin_write_OSCCONL(OSCCON | 0x0040u);
+    pins_lock();
 }
 
 /** The guide's next line, if it has one: "ask 4 ...", "ok BUS ...", "WRONG BUS ...", "FIX BUS_DIVIDER: ...". @return its end */
