@@ -70,9 +70,7 @@ static void request_command(request_t *request, drive_t *d, const drive_params_t
     if (!request->wish_run) {
         d->command.run = 0;
     } else if (d->state == (uint16_t)DRIVE_STOPPED) {
-        if (!d->command.run) {
-            drive_begin(d, p, (int16_t)((target >= 0) ? 1 : -1));
-        }
+        drive_start(d, p, (int16_t)((target >= 0) ? 1 : -1));
     } else if (drive_is_closed(d)) {
         d->command.run = 1; /* a stop under way goes on from the present speed; the drive itself turns to the target's direction */
     } else if ((target ^ d->direction) < 0) {

@@ -142,9 +142,12 @@ void drive_init(drive_t *d, const drive_params_t *p)
     drive_update_model(&d->run, p, p->end_erpm, p->end_erpm);
 }
 
-void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
+void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
 {
     drive_run_t *run = &d->run;
+    if (d->state != (uint16_t)DRIVE_STOPPED || d->command.run) {
+        return;
+    }
     drive_set_direction(d, direction);
     drive_zero(&d->forced, sizeof d->forced);
     drive_zero(&d->dead, sizeof d->dead);
@@ -162,13 +165,6 @@ void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction)
     catch_begin(run, p);
     mode_start(d, p);
     d->command.run = 1;
-}
-
-void drive_start(drive_t *d, const drive_params_t *p, int16_t direction)
-{
-    if (d->state == (uint16_t)DRIVE_STOPPED && !d->command.run) {
-        drive_begin(d, p, direction);
-    }
 }
 
 /** Leaves a state whose bridge is off, or is left by a fault. Called nowhere else, so that catch.c's wcet line can name this way out. */

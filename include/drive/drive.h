@@ -158,7 +158,7 @@ struct drive {
     voltage_circle_t circle; /**< voltage circle at this bus */
     uint16_t duty_per_volt_q16;
 
-    forced_angle_t forced;     /**< a start clears it, with all that follows (drive_begin()) */
+    forced_angle_t forced;     /**< a start clears it, with all that follows (drive_start()) */
     dead_duties_t dead;        /**< dead-time compensation of the next two pulses, or of the first */
     dead_duties_t dead_second; /**< of the second pulse to come, where each has its own */
     angle_t angle;             /**< control angle of the next sample */

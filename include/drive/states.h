@@ -154,9 +154,6 @@ uint16_t drive_outputs(const drive_t *d);
  *  @param direction +1 or -1 */
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
-/** drive_start() in place, for the one who calls it and has seen that the drive may start. */
-void drive_begin(drive_t *d, const drive_params_t *p, int16_t direction);
-
 /** A period with the bridge off or charging its drivers, after its duties: each state says which comes next, the gate lets it in or not. */
 void idle_step(drive_t *d, const drive_params_t *p, int16_t i_a, int16_t i_b);
 
