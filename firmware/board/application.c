@@ -60,7 +60,6 @@ static void application_tell_heat(app_told_t *told UNUSED)
 static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapsed_ms)
 {
     const drive_t *d = &board_drive;
-    const mode_range_t slow = mode_target_range(&board_params, 0), fast = mode_target_range(&board_params, 1);
     told->elapsed_ms = elapsed_ms;
     told->state = d->state;
     told->fault = d->fault;
@@ -76,10 +75,8 @@ static void application_tell(app_told_t *told, app_asks_t *asks, uint16_t elapse
     told->bus_q15 = qm_hi(d->bus_q31);
     application_operated(told, elapsed_ms);
     application_tell_heat(told);
-    told->slow.low = slow.low;
-    told->slow.high = slow.high;
-    told->fast.low = fast.low;
-    told->fast.high = fast.high;
+    told->slow = mode_target_range(&board_params, 0);
+    told->fast = mode_target_range(&board_params, 1);
     asks->run = request_stands(&board_request);
     asks->target_erpm = d->command.target_erpm;
     asks->clear_fault = 0;

@@ -62,10 +62,8 @@ enum {
     APP_LED_RUN = 2    /**< lights LED RUN */
 };
 
-/** Lowest and highest of a range. */
-typedef struct {
-    int16_t low, high;
-} app_range_t;
+/** Lowest and highest of a range: low, high. */
+typedef pot_range_t app_range_t;
 
 /** Its value at a share of it, 0..65535 from low to high. */
 int16_t app_between(app_range_t range, uint16_t share_q16) APP_CALLS;

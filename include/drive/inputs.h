@@ -46,6 +46,11 @@ typedef struct {
     uint16_t broken_ms;       /**< how long its signal has been where no position is */
 } pot_t;
 
+/** What the ends of its travel mean. */
+typedef struct {
+    int16_t low, high;
+} pot_range_t;
+
 /** At its lower end. */
 void pot_init(pot_t *pot);
 

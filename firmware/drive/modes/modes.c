@@ -94,9 +94,9 @@ uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction)
 #endif
 }
 
-mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range UNUSED)
+pot_range_t mode_target_range(const drive_params_t *p, int16_t fast_range UNUSED)
 {
-    mode_range_t range;
+    pot_range_t range;
 #ifdef TORQUE_MODE
     range.low = MODE_TWO_DIRECTIONS || (DIRECTION_INPUT_USED); /* never 0 then: the sign is the direction */
     range.high = p->current_max_q13;

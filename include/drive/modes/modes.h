@@ -24,6 +24,7 @@
 #ifndef DRIVE_MODES_MODES_H
 #define DRIVE_MODES_MODES_H
 
+#include "drive/inputs.h"
 #include "drive/modes/bringup.h"
 #include "drive/modes/identify.h"
 #include "drive/modes/profile.h"
@@ -108,13 +109,8 @@ uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction);
 
 /* ---- TORQUE_MODE: the potentiometer commands the q current; speed is only limited ---- */
 
-/** Ends of the potentiometer's travel: speeds, or q currents in Q13. */
-typedef struct {
-    int16_t low, high;
-} mode_range_t;
-
-/** What the potentiometer's travel means. @param fast_range S3's speed range, NOMINAL to MAXIMUM; not with two directions */
-mode_range_t mode_target_range(const drive_params_t *p, int16_t fast_range);
+/** What the ends of the potentiometer's travel mean: speeds, or q currents in Q13. @param fast_range S3's speed range, NOMINAL to MAXIMUM; not with two directions */
+pot_range_t mode_target_range(const drive_params_t *p, int16_t fast_range);
 
 /** 1 while the mode, and no speed controller, makes the q current. */
 uint16_t mode_commands_current(const drive_t *d);

@@ -19,9 +19,8 @@ static remote_t *the_client;
 /** What the panel is told by a board with these parameters. */
 static inline app_told_t panel_told(const drive_params_t *p, const buttons_t *in)
 {
-    const mode_range_t slow = mode_target_range(p, 0), fast = mode_target_range(p, 1);
     app_told_t told = { .elapsed_ms = in->elapsed_ms, .state = drive.state, .fault = drive.fault, .is_running = drive_is_running(&drive), .towards = drive.direction,
-                        .slow = { slow.low, slow.high }, .fast = { fast.low, fast.high } };
+                        .slow = mode_target_range(p, 0), .fast = mode_target_range(p, 1) };
     told.inputs = (uint16_t)((in->s2_down ? (uint16_t)APP_S2 : 0u) | (in->s3_down ? (uint16_t)APP_S3 : 0u));
     told.pot_is_lost = pot_is_broken(&the_pot, p, in->elapsed_ms);
     told.pot_q16 = mode_pot_split(pot_travel(p, pot_smooth(&the_pot)), &told.towards);
