@@ -40,7 +40,7 @@
 #define KCURRA -0.5                 /* [1]             -0.6 .. 0.6    gain of phase A's current, 0.5 = 1; negative: shunt in the low leg */
 #define KCURRB -0.5                 /* [1]             -0.6 .. 0.6    gain of phase B's current */
 #define BUS_FULL_SCALE_V 52.8       /* [V]             10 .. 330      bus voltage that gives full scale at the converter */
-#define SAMPLE_WINDOW_SEC 0.0000016 /* [s]             0.0000015 .. 0.000004 low sides on for this long on each side of the sample's centre */
+#define SAMPLE_WINDOW_SEC 0.0000016 /* [s]             0.0000015 .. 0.000004 at the highest duty low sides on for this long on each side of the middle of their on time */
 #define FAULT_INPUT_USED 1          /* [switch]        0 .. 1         1: FLTA1 low switches the outputs off; 0: a board without it, where only OVER_CURRENT_THRESHOLD_A protects */
 
 /* ---- Speeds ------------------------------------------------------------------------------------------------------- */

@@ -87,8 +87,8 @@ PIN_NEEDS(pulses_have_an_RP_number, PIN_RP(BOARD_PIN_PULSE) >= 0);
 #define BOARD_OUTPUTS_OFF 0x0000u
 #define BOARD_OUTPUTS_BOOTSTRAP 0x0015u /* all low sides on */
 #define BOARD_OUTPUTS_PWM 0x3F00u
-/* Special event 1.5 us (SAMPLE_DELAY_CLOCKS) after the counter's peak, counting down: the low sides have then been on for
- * SAMPLE_WINDOW_SEC + 1.5 us - dead time, and stay on for SAMPLE_WINDOW_SEC - 1.5 us, at the highest duty. */
+/* Special event SAMPLE_DELAY_CLOCKS after the counter's peak, counting down: at the highest duty the low sides have then been on for SAMPLE_WINDOW_SEC
+ * and this delay less the dead time, and stay on for SAMPLE_WINDOW_SEC less this delay. */
 #define BOARD_P1SECMP ((uint16_t)(0x8000u | (BOARD_P1TPER - SAMPLE_DELAY_CLOCKS)))
 
 /* ---- ADC1: four channels at once, 10 bits, signed fractional, started by the PWM; conversion 12 TAD * 4 * 100 ns = 4.8 us ---- */

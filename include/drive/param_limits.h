@@ -27,7 +27,7 @@
     X(KCURRA, "1", -0.6, 0.6, FROM_BOARD, "gain of phase A's current, 0.5 = 1; negative: shunt in the low leg") \
     X(KCURRB, "1", -0.6, 0.6, FROM_BOARD, "gain of phase B's current") \
     X(BUS_FULL_SCALE_V, "V", 10, 330, FROM_BOARD, "bus voltage that gives full scale at the converter") \
-    X(SAMPLE_WINDOW_SEC, "s", 0.0000015, 0.000004, FROM_BOARD, "low sides on for this long on each side of the sample's centre") \
+    X(SAMPLE_WINDOW_SEC, "s", 0.0000015, 0.000004, FROM_BOARD, "at the highest duty low sides on for this long on each side of the middle of their on time") \
     X(FAULT_INPUT_USED, "switch", 0, 1, 1, "1: FLTA1 low switches the outputs off; 0: a board without it, where only OVER_CURRENT_THRESHOLD_A protects")
 
 #define PARAM_SPEEDS(X) /* Speeds */ \

@@ -303,6 +303,8 @@ BAD_BOARDS = {
     "reference": ("value = 1.65", "value = 2.5", "reference = 2.5 V is not the middle of the converter's 3.3 V"),
     "limits in order": ("value = 34", "value = 26", "do not rise in this order", "12, 24, 27, 26 and 52.8 V"),
     "bus beyond the converter": ("bus_divider = { value = 16", "bus_divider = { value = 10", "do not rise in this order"),
+    "slow amplifier": ("settle = { value = 1.0", "settle = { value = 2.0", "settle = 2 us is longer than the low sides conduct before the sample",
+                       "sample_window + 1.5 us - dead_time = 1.1 us", "raise sample_window of [pwm] to 2.5 us"),
     "derived key": ("", "[plant]\n\"shunt.gain_v_per_a\" = 1", "'shunt.gain_v_per_a' stands in another table"),
     "motor's key": ("", "[plant]\n\"motor.rs_ohm\" = 1", "'motor.rs_ohm' is no key of a board"),
 }

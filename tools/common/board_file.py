@@ -12,6 +12,7 @@ from . import paths, pins, units
 from .board_keys import Part, Values
 from .errors import Problems, UserError
 from .motor_file import Motor, read_safely
+from .param_rows import number
 from .toml_file import Document, Section, flatten
 from .units import Conversion, Key, Kind, Quantity
 
@@ -44,7 +45,7 @@ TABLES: dict[str, dict[str, Key]] = {
             "noise": Key("standard deviation of a conversion", Kind("LSB", 0.0, 10.0, {"LSB": Conversion(1.0)}), plant="adc.noise_lsb")},
     "pwm": {"period": Key("PWM and control period", Kind("s", 25e-6, 140e-6, _TIME | _FREQUENCY)),
             "dead_time": Key("between the transistors of a leg", Kind("s", 0.5e-6, 3e-6, _TIME)),
-            "sample_window": Key("low sides on, on each side of the sample", Kind("s", 1.5e-6, 4e-6, _TIME))},
+            "sample_window": Key("low sides on at the highest duty, on each side of the middle of their on time", Kind("s", 1.5e-6, 4e-6, _TIME))},
     "limits": {"over_voltage": Key("bus above it trips", Kind("V", 6.0, 100.0, _VOLT)),
                "under_voltage": Key("bus below it trips while running", Kind("V", 3.0, 60.0, _VOLT)),
                "regen": Key("braking current falls from here", Kind("V", 6.0, 100.0, _VOLT))}}
@@ -84,6 +85,8 @@ class BoardFile:
         return self.values
 
 
+SAMPLE_CLOCK_S = 25e-9
+"""Unit of SAMPLE_DELAY_CLOCKS."""
 DEFAULT = "mclv"
 """Where nobody names a board."""
 
@@ -180,4 +183,15 @@ def _check(board: BoardFile) -> None:
         problems.found.append(UserError("under_voltage, supply voltage, regen, over_voltage and the converter's bus range do not rise in this order",
                         where["limits.over_voltage"], f"they are {board.under_voltage_v:g}, {board.nominal_bus_v:g}, {board.regen_limit_v:g}, "
                         f"{board.over_voltage_v:g} and {board.bus_full_scale_v:g} V"))
+    problems.attempt(lambda: _check_sample(board, where))
     problems.tell()
+
+
+def _check_sample(board: BoardFile, where: dict[str, str]) -> None:
+    """The low sides must conduct for the amplifier's time before the sample: docs/law.md#the-sample."""
+    delay_s, settle_s = SAMPLE_CLOCK_S * number("SAMPLE_DELAY_CLOCKS"), board.quantities["shunt.settle"].value_si
+    conducts_s = board.sample_window_s + delay_s - board.dead_time_s
+    if settle_s > conducts_s + 1e-10:
+        raise UserError(f"settle = {settle_s * 1e6:g} us is longer than the low sides conduct before the sample at the highest duty, sample_window + "
+                        f"{delay_s * 1e6:g} us - dead_time = {conducts_s * 1e6:.3g} us", where["shunt.settle"],
+                        f"raise sample_window of [pwm] to {(settle_s - delay_s + board.dead_time_s) * 1e6:.4g} us (docs/law.md#the-sample)")
