@@ -40,7 +40,7 @@ static uint16_t panel_fault_light(uint16_t blink_ms, uint16_t burst_ms)
     return (uint16_t)(blink_ms < burst_ms && (blink_ms / PANEL_BLINK_MS) % 2u == 0u);
 }
 
-/** LED ALIVE blinks once a second; in a fault it blinks the code, then pauses. LED RUN is on while the bridge conducts. */
+/** LED ALIVE blinks once a second; in a fault it blinks the code, then pauses. LED RUN is on while the bridge switches. */
 static uint16_t panel_lights(panel_t *panel, const app_told_t *told)
 {
     uint16_t burst_ms = (uint16_t)(2u * PANEL_BLINK_MS * told->fault), lit;

@@ -74,7 +74,7 @@ typedef struct {
     uint16_t state;              /**< drive_state_t */
     uint16_t fault;              /**< drive_fault_t; FAULT_NONE is 0 */
     uint16_t limits;             /**< bits of limit_reason_t: why the drive gives less than it is asked for */
-    uint16_t is_running;         /**< 1 while the bridge conducts */
+    uint16_t is_running;         /**< 1 while the bridge switches: ALIGN to STOPPING */
     uint16_t is_remote;          /**< 1 while a client of the serial line is in command: what is asked for waits */
     speed_erpm_t speed_erpm;     /**< estimated speed, counts of APP_RPM(); 0 while the bridge is off */
     speed_erpm_t reference_erpm; /**< the speed reference on its ramp, counts of APP_RPM() */
@@ -114,7 +114,7 @@ typedef struct {
 #endif
 } app_asks_t;
 
-/** The plain lights: ALIVE unless there is a fault, RUN while the bridge conducts. @return for asks->outputs */
+/** The plain lights: ALIVE unless there is a fault, RUN while the bridge switches. @return for asks->outputs */
 uint16_t app_lights(const app_told_t *told) APP_CALLS;
 
 /** Once after a reset, before the outputs are on: the application's own variables begin anew. */

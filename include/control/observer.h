@@ -54,10 +54,10 @@ speed_erpm_t observer_speed(const observer_t *o);
 /** The q current that holds the load, with 13 fraction bits. */
 int32_t observer_load_q26(const observer_t *o, const observer_params_t *p);
 
-/** The same in whole counts. */
+/** observer_load_q26() in whole counts. */
 current_q13_t observer_load(const observer_t *o, const observer_params_t *p);
 
-/** 1 while nothing does. */
+/** 1 while nothing changes fast: no innovation has been large in the last 50 ms or so. */
 uint16_t observer_gate_is_closed(const observer_t *o);
 
 /** a + (b - a) * share; b - a fits a word. @param share 0..1 */

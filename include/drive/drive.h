@@ -1,4 +1,4 @@
-/* The drive's types: states, parameters, and the one object with everything the machine knows. */
+/* The drive's types: parameters, requests, a run, and the one object with everything the machine knows. */
 #ifndef DRIVE_DRIVE_H
 #define DRIVE_DRIVE_H
 
@@ -146,7 +146,7 @@ struct drive_run {
 /** Everything the drive knows. Owned by the board; zero plus drive_init() is the start. */
 struct drive {
     drive_command_t command;
-    volatile uint16_t state; /**< drive_state_t; written by drive_enter() only */
+    volatile uint16_t state; /**< drive_state_t; written by states_write() only */
     volatile uint16_t fault; /**< drive_fault_t, kept until cleared; drive_raise(), drive_clear_fault() */
     volatile uint16_t ticks; /**< periods since power-up, wraps; the background's time base */
     uint16_t periods;        /**< in the present state: CALIBRATE, BOOTSTRAP, CATCH and ALIGN count it, RAMP at its end, BRAKE without current */

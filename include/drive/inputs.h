@@ -1,4 +1,4 @@
-/* What a person does at the board: buttons, potentiometer, and what the LEDs say. */
+/* What a person does at the board: buttons, potentiometer, contacts; and what the LEDs show. */
 #ifndef DRIVE_INPUTS_H
 #define DRIVE_INPUTS_H
 

@@ -15,7 +15,8 @@ typedef struct {
 } drive_samples_t;
 
 /* clang-format off */
-/** SLOT(number, first half, in states, second half, in states): functions of schedule.c; EVERY, RUNNING (the bridge switches) or CLOSED (closed loop). */
+/** SLOT(number, first half, in states, second half, in states): functions of schedule.c; EVERY, RUNNING (ALIGN to STOPPING) or CLOSED (CLOSED and
+ *  STOPPING, the states in closed loop). */
 #define SCHEDULE_TABLE(SLOT) \
     SLOT( 0, observe_load,  EVERY,     control_speed,    CLOSED) \
     SLOT( 1, step_state,    EVERY,     follow_bus,       EVERY) \

@@ -19,7 +19,7 @@ int32_t reference_slope(const drive_params_t *p, speed_erpm_t reference, speed_e
 /** The observer's rate and the gain that goes with it. */
 void speed_schedule(drive_run_t *run, const drive_params_t *p);
 
-/** The same in whole counts. */
+/** The q current that the controller asks for to hold a speed, within iq_limit_q13: gain times the speed's error, and the observed load. */
 current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm);
 
 /** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer. It acts while the reference
@@ -34,7 +34,7 @@ void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_e
  *  SPEED_SWING_STEPS apart in the mean. A load step is up to three such times; slower swings are the loop's own, with far more inertia than the header's. */
 uint16_t speed_swings(const drive_run_t *run);
 
-/** The same step by step: what a step leaves below a whole count goes to the next, for a count can turn a light rotor out of its speed. */
+/** speed_current() step by step: what a step leaves below a whole count goes to the next, for a count can turn a light rotor out of its speed. */
 current_q13_t speed_current_step(drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm);
 
 /** The next speed reference. */

@@ -35,19 +35,19 @@ typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_sta
     X(CATCH, "a start is requested, and the bus is so high that switching would trip") \
     TRANSITIONS_BY_SUPERVISION(X)
 #define TRANSITIONS_FROM_BOOTSTRAP(X) \
-    X(STOPPED, "the request is taken back") \
+    X(STOPPED, "the request is taken back, or its target is in the other direction") \
     X(ALIGN, "the drivers are charged, the rotor stands") \
     X(CATCH, "a look has ended, and the rotor turns") \
     TRANSITIONS_BY_SUPERVISION(X) \
     TRANSITIONS_BY_CURRENT_OR_BUS(X)
 #define TRANSITIONS_FROM_ALIGN(X) \
-    X(STOPPED, "the request is taken back") \
+    X(STOPPED, "the request is taken back, or its target is in the other direction") \
     X(RAMP, "LOCK_TIME is over: the rotor turns with the vector") \
     TRANSITIONS_BY_SUPERVISION(X) \
     TRANSITIONS_BY_CURRENT_OR_BUS(X)
 #define TRANSITIONS_FROM_RAMP(X) \
-    X(STOPPED, "the request is taken back") \
-    X(CLOSED, "the estimator agrees, and the current pulls the rotor: hand-over") \
+    X(STOPPED, "the request is taken back, or its target is in the other direction") \
+    X(CLOSED, "the estimator agrees, and the current pulls the rotor: hand-over; never in OPEN_LOOP_FUNCTIONING, IDENTIFY, BRINGUP") \
     X(FAULT, "START_FAILED: it does not agree in time, or swings too long") \
     TRANSITIONS_BY_SUPERVISION(X) \
     TRANSITIONS_BY_CURRENT_OR_BUS(X)
@@ -71,7 +71,7 @@ typedef enum { DRIVE_STATE_TABLE(DRIVE_STATE_ENUM) DRIVE_STATE_COUNT } drive_sta
     X(STOPPED, "the fault is cleared") \
     TRANSITIONS_BY_SUPERVISION(X)
 #define TRANSITIONS_FROM_CATCH(X) \
-    X(STOPPED, "the request is taken back") \
+    X(STOPPED, "the request is taken back, or its target is in the other direction") \
     X(BOOTSTRAP, "the pause is over and the bus is low enough: the next look, or a start without one") \
     X(RAMP, "the rotor is seen, slower than the minimum speed") \
     X(CLOSED, "the rotor is seen, fast enough for the estimator") \
@@ -141,7 +141,7 @@ uint16_t drive_is_forced(const drive_t *d);
 /** 1 with the estimator's angle in command: CLOSED or STOPPING. */
 uint16_t drive_is_closed(const drive_t *d);
 
-/** 1 while the bridge conducts, its drivers' charge with it, BOOTSTRAP to STOPPING: drive_outputs() are not off. In one comparison. */
+/** 1 while the bridge conducts, its drivers' charge with it, BOOTSTRAP to STOPPING, in one comparison. Not in BRAKE, whose low sides conduct, too: drive_shorts(). */
 uint16_t drive_conducts(const drive_t *d);
 
 /** 1 in BRAKE: the law rests, and the low sides short-circuit the winding. */

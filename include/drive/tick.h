@@ -14,8 +14,8 @@ void drive_run(drive_t *d, const drive_params_t *p, duties_t *duty);
 /** Last of the slow work: what the law of the next two periods needs and the samples do not change. */
 void drive_prepare(drive_t *d, const drive_params_t *p);
 
-/** One PWM period up to the duties; after it, where schedule_is_due() or the bridge does not switch, drive_slow(), which has no deadline,
- *  drive_outputs(), and last drive_latch_fault(). @param raw the converter's results at the centre of the low sides' conduction @param duty
+/** One PWM period up to the duties; after it, where schedule_is_due() or the bridge does not switch, drive_slow(), which may take until the next
+ *  period, drive_outputs(), and last drive_latch_fault(). @param raw the converter's results, sampled while the low sides conduct @param duty
  *  the board must load it before the next PWM boundary; 0, the low sides on, where the bridge does not switch @return 1 where it does */
 uint16_t drive_tick(drive_t *d, const drive_params_t *p, const drive_samples_t *raw, duties_t *duty);
 

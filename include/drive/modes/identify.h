@@ -1,7 +1,7 @@
 /* IDENTIFY: the drive measures R, Ld, Lq, Kphi, inertia and friction of an unknown motor.
  *
- * The control interrupt is the instrument (identify_tick.h): it holds a current, superposes a square voltage, turns a current vector
- * or lets it follow the rotor, and adds up what it sees. The background measures (identify.c): it takes the sums, computes, and asks
+ * The control interrupt is the instrument (identify_run()): it holds a current, superposes a square voltage, turns a current vector
+ * or lets it follow the rotor, and adds up what it sees. The background measures (identify_background()): it takes the sums, computes, and asks
  * for the next step. `ready` names the owner; the other side must not access the guarded fields. */
 #ifndef DRIVE_MODES_IDENTIFY_H
 #define DRIVE_MODES_IDENTIFY_H
