@@ -66,6 +66,20 @@ def test_the_true_motor_is_off_its_header(benches):
     assert all(plant["motor.ld_h"] == plant["motor.lq_h"] for plant in plants)
 
 
+def test_winding_and_magnets_change_no_faster_than_copper_warms(benches):
+    seen = []
+    for number in range(1, 61):
+        scenario = soak.draw(1, number, benches).scenario
+        now = scenario.plant.values
+        for event in scenario.events:
+            for key in {"motor.rs_ohm", "motor.psi_vs"} & set(event.keys):
+                ratio = abs(np.log(event.keys[key] / now[key]))
+                assert ratio <= 0.05 * event.over_s + 1e-9, (number, event)
+                seen.append(ratio)
+                now = now | {key: event.keys[key]}
+    assert len(seen) > 60 and max(seen) > 0.15
+
+
 def test_loads_at_low_speed_leave_an_estimator_something_to_see(benches):
     """Half of E = P w psi for what R may be off, and half of w for what a load takes in an electrical period; of the Hurst, by hand."""
     seen = 0

@@ -38,6 +38,8 @@ SHARES = (0.6, 0.5, 0.4, 0.3, 0.2, 0.1, 0.0)
 """Of the rated torque: the largest that motor and supply can hold is drawn from."""
 SAGS, WARM_R, WARM_PSI, TRUE_L = (0.87, 1.0), (0.7, 1.4), (0.8, 1.2), (0.75, 1.25)
 """What the supply may sag to, and what the true motor may be of its header's: a wrong header, and temperature."""
+WARM_PER_S = 0.05
+"""By how much winding and magnets change in a second: copper's 0.39 % a K times 13 K. 50 A/mm2 warm a wire so fast, rho j^2 / (c density)."""
 HOLD_S, HOLD_TORQUES = (0.01, 0.1), (1.3, 3.0)
 """How long a hand holds the shaft, and how hard: times the most torque that the drive has."""
 HELD = HeldTable.read(paths.TABLES / "held.toml")
@@ -190,12 +192,13 @@ class _Drawing:
         self.rests: list[tuple[float, float, float]] = []
         self.held: list[tuple[float, float]] = []
         self.rpm, self.load_nm, self.starts, self.now_s, self.true_l = 0.0, 0.0, 0, 0.2, r.uniform(*TRUE_L)
+        self.warm: dict[str, float] = {}
 
     def segment(self) -> Segment:
         values = {"rng.seed": float(self.r.randrange(1, 2**31)), "adc.noise_lsb": self.r.uniform(0.3, 1.5),
                   "shunt.offset_a_v": self.r.uniform(-0.02, 0.02), "shunt.offset_b_v": self.r.uniform(-0.02, 0.02),
                   "supply.resistance_ohm": float(self.plant.get("supply.resistance_ohm", 0.1)) * self.r.uniform(0.5, 2.0),
-                  **{key: value * self.r.uniform(*span) for key, value, span in self._warm()}}
+                  **self._true()}
         values |= {key: float(self.plant[key]) * self.true_l for key in ("motor.ld_h", "motor.lq_h")}
         self._load(self.r.uniform(0.0, 0.5) * self.motor.start_torque_nm, 0.0, 0.0)
         self._start()
@@ -206,8 +209,15 @@ class _Drawing:
                             plant=Values(values, {key: WHERE for key in values}))
         return Segment(self.number, self.name, self.mode, scenario, self.rests, self.starts, self.held)
 
-    def _warm(self) -> list[tuple[str, float, tuple[float, float]]]:
-        return [("motor.rs_ohm", float(self.plant["motor.rs_ohm"]), WARM_R), ("motor.psi_vs", float(self.plant["motor.psi_vs"]), WARM_PSI)]
+    def _true(self, over_s: float | None = None) -> dict[str, float]:
+        """Resistance and flux of the true motor: any at first, then what they may have become in a time."""
+        for key, span in (("motor.rs_ohm", WARM_R), ("motor.psi_vs", WARM_PSI)):
+            if over_s is None:
+                self.warm[key] = self.r.uniform(*span)
+            else:
+                changed = self.warm[key] * math.exp(self.r.uniform(-1.0, 1.0) * WARM_PER_S * over_s)
+                self.warm[key] = min(max(changed, span[0]), span[1])
+        return {key: float(self.plant[key]) * factor for key, factor in self.warm.items()}
 
     def _event(self, at_s: float, kind: str, **more: Any) -> None:
         self.events.append(Event(round(at_s, 4), kind, WHERE, **more))
@@ -308,7 +318,7 @@ class _Drawing:
 
     def _temperature(self) -> None:
         over_s = self.r.uniform(1.0, 5.0)
-        self._set({key: value * self.r.uniform(*span) for key, value, span in self._warm()}, over_s)
+        self._set(self._true(over_s), over_s)
         self.now_s += over_s
         self._rest(0.0)
 
