@@ -107,8 +107,9 @@ def test_the_table_of_drawn_holds_says_how_many_are_well_and_what_followed():
 
 
 # ---- what is measured ----------------------------------------------------------------------------------------------------
-def recorded(speed, *, state=step((0, 4), (0.2, 5)), fault=0.0):
-    return run('[[measure]]\nname = "measured"\nfrom_s = 0.5\nto_s = 2.0\n', plant__speed_rpm=speed, fw__speed_ref_rpm=1400.0, fw__state=state, fw__fault=fault)
+def recorded(speed, *, state=step((0, 4), (0.2, 5)), fault=0.0, limits=0.0):
+    return run('[[measure]]\nname = "measured"\nfrom_s = 0.5\nto_s = 2.0\n', plant__speed_rpm=speed, fw__speed_ref_rpm=1400.0, fw__state=state, fw__fault=fault,
+               fw__limits=limits)
 
 
 def test_the_speed_backwards_and_the_time_to_the_reference_are_read_from_the_run():
@@ -119,6 +120,13 @@ def test_the_speed_backwards_and_the_time_to_the_reference_are_read_from_the_run
     assert sweep().measured(recorded(step((0, 1400), (0.5, 0), (0.6, 1360))), bare)["back_s"] is None
     assert sweep().measured(recorded(step((0, 1400), (0.5, 0), (0.6, 1360))), ITEM)["back_s"] is not None
     assert not sweep().measured(recorded(1400.0, state=4), ITEM)["turned"]
+
+
+def test_a_motor_whose_voltage_gave_less_than_the_reference_must_be_back_at_what_it_had():
+    slow = step((0, 1300), (0.5, 0), (0.7, 1300))
+    assert sweep().measured(recorded(slow), ITEM)["back_s"] is None
+    assert sweep().measured(recorded(slow, limits=step((0, 2), (0.5, 0))), ITEM)["back_s"] == pytest.approx(0.1, abs=0.05)
+    assert sweep().measured(recorded(step((0, 1300), (0.5, 0), (0.7, 1200)), limits=2.0), ITEM)["back_s"] is None
 
 
 def test_a_fault_is_told_with_its_time_from_the_release():

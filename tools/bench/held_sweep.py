@@ -29,7 +29,7 @@ TURNING = "CLOSED"
 MEAN_S = 0.1
 """The speed is its mean over this time: at a low speed dead time's ripple is more than two per cent."""
 BEFORE_S = 0.2
-"""Of the reference that the speed must come back to."""
+"""Of the reference that the speed must come back to, or of the speed where the drive named a limit: the voltage of a motor off its header."""
 WATCH_S = 0.3
 """At least this long the speed must be back."""
 
@@ -202,7 +202,9 @@ class Held(DrawnSweep):
         held_s, end_s = run.scenario.measures[0].from_s, run.scenario.duration_s
         free_s = held_s + item.until_s
         watched, free = run.trace.part(held_s, end_s), run.trace.part(free_s, end_s)
-        reference = float(run.trace.part(held_s - BEFORE_S, held_s).column("fw.speed_ref_rpm").astype(np.float64).mean())
+        before = run.trace.part(held_s - BEFORE_S, held_s)
+        names = ("fw.speed_ref_rpm", "plant.speed_rpm") if before.column("fw.limits").any() else ("fw.speed_ref_rpm",)
+        reference = min(float(before.column(name).astype(np.float64).mean()) for name in names)
         faults = run.raised()
         current = np.hypot(watched.column("plant.i_d").astype(np.float64), watched.column("plant.i_q").astype(np.float64))
         return {"picture": picture.of(run, picture.SWEEP_STRETCHES), "turned": state_at(run, held_s) == TURNING,
