@@ -144,38 +144,32 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     d->run.estimator.omega_filtered_q16 = 0;
 }
 
-/** The estimator goes on. @param omega_erpm of the rotor @param load of the observer */
-static void held_go_on(drive_t *d, const drive_params_t *p, speed_erpm_t omega_erpm, int32_t load_q16)
+/** The estimator goes on. @param stood 1: the rotor stood, and turns now; 0: it has turned all the time, as fast as when it was asked, and by what the
+ *  back-EMF gained since */
+static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t stood)
 {
     drive_run_t *run = &d->run;
-    held_enter(&run->held, HELD_TURNS);
+    held_t *shaft = &run->held;
+    int32_t load_q16 = run->observer.load_q16;
+    speed_erpm_t omega_erpm;
+    run->estimator.sign = along_direction(d, 1); /* while the angle stood it had none */
+    omega_erpm = held_speed(run, emf);
+    run->estimator.omega_filtered_q16 = (int32_t)omega_erpm * 65536;
+    if (stood) {
+        load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : load_q16;
+        shaft->stood = 2;
+    } else {
+        shaft->turned_q12 = qm_within(shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience)), -32767, 32767);
+    }
+    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
+    held_enter(shaft, HELD_TURNS);
     drive_update_model(run, p, run->control.reference_erpm, omega_erpm);
     observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, omega_erpm, 0);
     run->observer.load_q16 = load_q16;
     run->observer.fast_share_q15 = 32767;
     run->observer.gate_level = 0;
-    run->held.lag_q12 = 0;
-}
-
-/** It has turned all the time: as fast as when it was asked, and by what the back-EMF gained since. */
-static void held_has_turned(drive_t *d, const drive_params_t *p, dq_t emf)
-{
-    held_t *shaft = &d->run.held;
-    const int32_t sum = shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience));
-    shaft->turned_q12 = qm_within(sum, -32767, 32767);
-    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(&d->run, shaft->turned_q12), 1));
-    held_go_on(d, p, held_speed(&d->run, emf), d->run.observer.load_q16);
-}
-
-/** It stood, and turns now. */
-static void held_turns_again(drive_t *d, const drive_params_t *p, dq_t emf)
-{
-    drive_run_t *run = &d->run;
-    held_t *shaft = &run->held;
-    const int32_t load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : run->observer.load_q16;
-    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
-    shaft->stood = 2;
-    held_go_on(d, p, held_speed(run, emf), load_q16);
+    shaft->lag_q12 = 0;
+    shaft->emf_q12 = emf;
 }
 
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
@@ -187,11 +181,14 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps); /* since what it is compared with */
     const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
-    const int16_t turned = qm_sub_limited(shaft->emf_q12.d, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
-    const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least));
+    const int16_t before = (int16_t)((shaft->emf_q12.d < 0) ? shaft->emf_q12.d : 0);
+    const int16_t turned = qm_sub_limited(before, emf.d); /* -E sin: negative to either side, with E's sign that of the speed; what falls to 0 is a tail */
+    const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least)
+                                      && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
 
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
-        shaft->act = (uint16_t)(((turns && tells) || shaft->steps < HELD_ASK_STEPS) ? HELD_HAS_TURNED : HELD_GOES_ON);
+        const uint16_t has_turned = (uint16_t)((turns && tells) || (shaft->steps < HELD_ASK_STEPS && along_direction(d, shaft->emf_q12.q) >= 0));
+        shaft->act = (uint16_t)(has_turned ? HELD_HAS_TURNED : HELD_GOES_ON);
     } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && steps >= HELD_ASK_STEPS)) {
         shaft->act = (uint16_t)HELD_LEARN;
     } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */
@@ -277,6 +274,18 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
     observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
 }
 
+/** Has it turned all the time? A back-EMF that does not come to stand says so; but for one that goes more towards zero than round, that of a rotor which
+ *  comes to its stop. One that grows says so at once. */
+static uint16_t held_turns_on(const held_t *shaft, dq_t emf, uint16_t moved, uint16_t least_q12)
+{
+    const dq_t none = { 0, 0 };
+    const uint16_t size = held_moved(emf, none), before = held_moved(shaft->emf_q12, none);
+    if (shaft->steps <= shaft->patience) {
+        return (uint16_t)(shaft->steps > HELD_PATIENCE_STEPS && size > before + least_q12);
+    }
+    return (uint16_t)(size + (moved >> 1) >= before);
+}
+
 /** The angle stands. */
 static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
@@ -286,11 +295,11 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->turned_q12 = qm_sub_limited(shaft->turned_q12, qm_sub_limited(base_q12, emf.q));
     switch (shaft->phase) {
     case HELD_SETTLES:
-        if (moved <= most >> 1) {
+        if (moved <= most >> 1 && shaft->steps >= HELD_SETTLE_STEPS) {
             shaft->patience = shaft->steps;
             shaft->turned_q12 = 0;
             held_enter(shaft, HELD_ASKED);
-        } else if (shaft->steps > shaft->patience) {
+        } else if (held_turns_on(shaft, emf, moved, most)) {
             shaft->act = (uint16_t)HELD_HAS_TURNED;
             emf.q = 0; /* all of it is in the sum */
         } else {       /* the current changes */
@@ -332,9 +341,7 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
     switch (act) {
     case HELD_STOP: held_stop_angle(d, p); break;
     case HELD_HAS_TURNED:
-        held_has_turned(d, p, emf);
-        shaft->emf_q12 = emf;
-        break;
+    case HELD_GOES_ON: held_go_on(d, p, emf, (uint16_t)(act == (uint16_t)HELD_GOES_ON)); break;
     case HELD_LEARN:
         if (held_moved(emf, shaft->emf_q12) <= (uint16_t)p->adaptation.emf_least_q12 >> 1) { /* it was not let go while this waited */
             held_learn(d, p, emf);
@@ -343,10 +350,6 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
         }
         break;
     case HELD_TURN_BACK: held_turn_back(d, p, shaft->run_on); break;
-    case HELD_GOES_ON:
-        held_turns_again(d, p, emf);
-        shaft->emf_q12 = emf;
-        break;
     default: break; /* HELD_WAITS */
     }
 }

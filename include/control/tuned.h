@@ -130,6 +130,7 @@
 #define HELD_FAR_SHIFT 3         /* [shift] and 1/8 of the largest current as d current, which goes as the angle stops | soak */
 #define HELD_CLEAR_ANGLE 1024 /* [2^-16 turn] 5.6 degrees: so far from a phase's zero crossing the angle stands | held */
 #define HELD_PATIENCE_STEPS 4u /* [steps] of 16 periods for a back-EMF to stand, and twice as many for the currents | loadsteps */
+#define HELD_SETTLE_STEPS 2u /* [steps] of 16 periods at least: what the frame's turn shakes may stand still by chance in the first | soak */
 #define HELD_TURNED_RAD 0.175 /* [rad] ten degrees, electrical, by what its back-EMF gained: so far no shaft that is held goes | loadsteps */
 #define HELD_PULL_ANGLE 182   /* [2^-16 turn] a degree a step, by which all of the current pulls a rotor that stands | loadsteps */
 #define HELD_PULL_STEPS 32u   /* [steps] 32 degrees, and back: a load may have stopped it so far ahead of the frame, or behind | loadsteps */

@@ -59,8 +59,8 @@ static uint16_t answered(void)
 static void stands(int16_t direction, int16_t more_q12)
 {
     asked(direction, more_q12);
-    steps(1);
-    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    steps(HELD_SETTLE_STEPS - 1u);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
     (void)answered();
     steps(1); /* the frame a step later */
 }
@@ -295,6 +295,110 @@ void test_a_back_emf_against_the_direction_is_doubted_as_far_as_the_winding_may_
     }
 }
 
+void test_a_back_emf_that_stands_by_chance_as_the_frame_is_turned_has_not_settled(void)
+{
+    asked(1, 40);
+    steps(HELD_SETTLE_STEPS - 1u);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+    rig_emf(0, (int16_t)(40 + params.adaptation.emf_least_q12)); /* now it moves */
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+    steps(1);
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+}
+
+void test_a_back_emf_that_falls_as_that_of_a_rotor_that_comes_to_its_stop_is_waited_for(void)
+{
+    const int16_t moves = params.adaptation.emf_least_q12;
+    EACH_DIRECTION(direction) {
+        for (uint16_t turns = 0; turns < 2u; turns++) { /* 1: it turns by two thirds of what it falls */
+            uint16_t count = 0;
+            asked(direction, 0);
+            while (shaft->phase == (uint16_t)HELD_SETTLES && count < 3u * HELD_PATIENCE_STEPS) {
+                const int16_t falls = (int16_t)((3 * (int16_t)HELD_PATIENCE_STEPS - (int16_t)count) * moves);
+                rig_emf(turns ? (int16_t)(2 * (3 * (int16_t)HELD_PATIENCE_STEPS * moves - falls) / 3) : 0, (int16_t)(direction * falls));
+                steps(1);
+                count++;
+            }
+            TEST_ASSERT_EQUAL_UINT16(turns ? HELD_PATIENCE_STEPS + 1u : 3u * HELD_PATIENCE_STEPS, count);
+            TEST_ASSERT_EQUAL_UINT16(turns ? HELD_TURNS : HELD_SETTLES, shaft->phase);
+        }
+    }
+}
+
+void test_a_back_emf_that_grows_ends_the_longer_patience(void)
+{
+    const int16_t grows = (int16_t)(params.adaptation.emf_least_q12 + 1);
+    for (int16_t less = 0; less <= 1; less++) { /* 1: it grows no more than dead time shakes it */
+        uint16_t count = 0;
+        at(1, FAST_ERPM, 100, 0, 200);
+        drive.run.control.ref_q13.d = (int16_t)(-(params.current_max_q13 >> HELD_FAR_SHIFT) - 1);
+        steps(HELD_DOUBTS_MOST / HELD_DOUBTS_FAR + 1u);
+        TEST_ASSERT_EQUAL_UINT16(2u * HELD_PATIENCE_STEPS, shaft->patience);
+        while (shaft->phase == (uint16_t)HELD_SETTLES && count < 100u) {
+            const dq_t emf = estimator_emf(&drive.run.estimator);
+            rig_emf(0, (int16_t)(emf.q + grows - less));
+            steps(1);
+            count++;
+        }
+        TEST_ASSERT_EQUAL_UINT16(((less == 0) ? HELD_PATIENCE_STEPS : 2u * HELD_PATIENCE_STEPS) + 1u, count);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+    }
+}
+
+void test_a_d_part_that_falls_to_zero_is_a_filter_s_tail_and_below_zero_the_rotor_s_turn(void)
+{
+    const int16_t tail = (int16_t)(params.adaptation.emf_least_q12 / 2);
+    EACH_DIRECTION(direction) {
+        for (uint16_t turns = 0; turns < 2u; turns++) {
+            int16_t half;
+            asked(direction, 400);
+            half = (int16_t)(3.0F * 400.0F * (float)HELD_ASK_STEPS * counts_per_erpm() * 400.0F * (float)shaft->inv_kfi / 2048.0F / 65536.0F);
+            TEST_ASSERT_GREATER_THAN_INT16(tail, half); /* it tells */
+            rig_emf(tail, (int16_t)(direction * 400));
+            steps(HELD_SETTLE_STEPS);
+            TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+            steps(HELD_ASK_STEPS - 1u);
+            rig_emf((int16_t)(-half + (turns ? -4 : tail / 2)), (int16_t)(direction * 400));
+            steps(1);
+            TEST_ASSERT_EQUAL_INT16(turns, shaft->phase == (uint16_t)HELD_TURNS);
+        }
+    }
+}
+
+void test_a_rotor_whose_back_emf_was_against_the_direction_has_not_turned_all_the_time(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t stopped;
+        asked(direction, -80); /* R is less than the model's */
+        steps(HELD_SETTLE_STEPS);
+        TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+        stopped = estimator_next_angle(&drive.run.estimator);
+        rig_emf(0, (int16_t)(direction * (2 * params.adaptation.emf_least_q12 - 78))); /* at once it is let go */
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_EQUAL_UINT16(2, shaft->stood);
+        TEST_ASSERT_GREATER_OR_EQUAL_INT16(0, (int16_t)(direction * (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped)));
+    }
+}
+
+void test_a_rotor_that_goes_on_turns_in_the_drive_s_direction(void)
+{
+    EACH_DIRECTION(direction) {
+        stands(direction, 200);
+        drive.run.estimator.sign = (int16_t)-direction; /* of a back-EMF around zero */
+        steps(HELD_ASK_STEPS);
+        rig_emf(-60, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_EQUAL_INT16(direction, drive.run.estimator.sign);
+        TEST_ASSERT_EQUAL_INT16(observer_speed(&drive.run.observer), estimator_speed(&drive.run.estimator));
+        TEST_ASSERT_GREATER_THAN_INT16(0, (int16_t)(direction * estimator_speed(&drive.run.estimator)));
+        estimator_follow(&drive.run.estimator, &params.estimator);
+        TEST_ASSERT_EQUAL_INT16(direction, drive.run.estimator.sign);
+    }
+}
+
 void test_while_the_d_current_of_field_weakening_goes_a_back_emf_gets_twice_the_patience(void)
 {
     static const int16_t less_q13[] = { 0, 1 };
@@ -363,24 +467,29 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
         float per_step;
         int16_t ahead;
         int32_t load_q16;
-        at(direction, FAST_ERPM, 1500, 0, 400);
+        uint16_t count = 0;
+        at(direction, FAST_ERPM, 1500, 0, 220); /* so slow that its turn hides in the steps in which it settles */
         drive.run.observer.load_q16 = (int32_t)direction * 77 * 65536;
         load_q16 = drive.run.observer.load_q16;
         steps(HELD_DOUBTS_MOST);
         TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
         stopped = estimator_next_angle(&drive.run.estimator);
-        per_step = 1500.0F / 60.0F * 16.0F * PARAM_F(LOOPTIME_SEC) * 65536.0F; /* angle counts */
-        steps(1);
-        for (uint16_t n = 1; n <= HELD_ASK_STEPS && held_angle_stands(shaft); n++) {
-            rig_emf(qm_mulhi(-800, trig_sincos((angle_t)((float)n * per_step)).sin), (int16_t)(direction * 395));
+        per_step = 220.0F * counts_per_erpm() * (float)shaft->inv_kfi / 2048.0F;
+        steps(HELD_SETTLE_STEPS);
+        TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+        while (shaft->phase == (uint16_t)HELD_ASKED && count < 2u * HELD_ASK_STEPS) {
+            count++;
+            rig_emf(qm_mulhi(-440, trig_sincos((angle_t)((float)count * per_step)).sin), (int16_t)(direction * 215));
             steps(1);
         }
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_GREATER_OR_EQUAL_UINT16(HELD_ASK_STEPS, count);
         ahead = (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped);
-        { /* four steps with the first back-EMF, 400, three of them with 5 less; the last is 395 more what turned into the d axis */
+        { /* all steps with the first back-EMF, the last of them with 5 less; now it is 215 more what turned into the d axis */
             const dq_t last = estimator_emf(&drive.run.estimator);
-            const float erpm_per_q12 = (float)shaft->inv_kfi / 2048.0F, now_erpm = (395.0F + (float)qm_abs(last.d)) * erpm_per_q12;
-            TEST_ASSERT_INT16_WITHIN(20, (int16_t)((float)direction * per_step * (4.0F * 400.0F - 3.0F * 5.0F) * erpm_per_q12 / 1500.0F), ahead);
+            const float now_erpm = (215.0F + (float)qm_abs(last.d)) * (float)shaft->inv_kfi / 2048.0F;
+            const float turned = ((float)(HELD_SETTLE_STEPS + count) * 220.0F - (float)count * 5.0F) / 220.0F;
+            TEST_ASSERT_INT16_WITHIN(20, (int16_t)((float)direction * per_step * turned), ahead);
             TEST_ASSERT_INT16_WITHIN(10, (int16_t)((float)direction * now_erpm), observer_speed(&drive.run.observer));
         }
         TEST_ASSERT_EQUAL_INT32(load_q16, drive.run.observer.load_q16);
@@ -392,13 +501,13 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
 void test_a_back_emf_that_turns_by_less_than_half_of_what_it_says_or_by_what_dead_time_does_is_one_that_stands(void)
 {
     const int16_t least = (int16_t)(params.adaptation.emf_least_q12 / 2);
-    static const int16_t emf_q12[] = { 500, 40 }; /* half of its turn in three steps is more than dead time's, and less */
+    static const int16_t emf_q12[] = { 280, 40 }; /* half of its turn in three steps is more than dead time's, and less */
     EACH(n, emf_q12) {
         const int16_t half = (int16_t)(3.14F * (float)emf_q12[n] * 3.0F * 16.0F * (float)emf_q12[n] * (float)drive.run.model.inv_kfi / 2048.0F / 60.0F
                                        * PARAM_F(LOOPTIME_SEC));
         const int16_t most = (half > least) ? half : least;
         asked(1, emf_q12[n]);
-        steps(3); /* settled, and two steps asked */
+        steps((uint16_t)(HELD_SETTLE_STEPS + 2u + ((n == 0u) ? 0u : 2u * HELD_ASK_STEPS))); /* settled, and two steps asked; of little after the filter's tail */
         rig_emf((int16_t)(-most + 8), emf_q12[n]);
         steps(1);
         TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
@@ -417,7 +526,7 @@ void test_a_back_emf_whose_turn_dead_time_would_hide_is_asked_for_longer(void)
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
             asked(direction, cases[n].emf_q12);
-            TEST_ASSERT_EQUAL_UINT16(1u + cases[n].steps, answered());
+            TEST_ASSERT_EQUAL_UINT16(HELD_SETTLE_STEPS + cases[n].steps, answered());
         }
         asked(direction, 150); /* between: when half of its turn is more than dead time's */
         TEST_ASSERT_UINT16_WITHIN((HELD_ASK_MOST_STEPS - HELD_ASK_STEPS) / 2u - 2u, (HELD_ASK_MOST_STEPS + HELD_ASK_STEPS) / 2u, answered());
@@ -429,7 +538,7 @@ void test_a_back_emf_that_turns_backwards_is_no_rotor_that_turns_forwards(void)
     const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8); /* than dead time shakes it by */
     EACH_DIRECTION(direction) {
         asked(direction, 40);
-        steps(3);
+        steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS + 2u);
         rig_emf(more, (int16_t)(direction * 40));
         steps(1);
         TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
@@ -445,7 +554,7 @@ void test_a_back_emf_that_changes_late_in_a_long_question_turns_the_frame_by_wha
     EACH_DIRECTION(direction) {
         angle_t stopped;
         asked(direction, 20);
-        steps(1u + HELD_ASK_MOST_STEPS / 2u);
+        steps(HELD_SETTLE_STEPS + HELD_ASK_MOST_STEPS / 2u);
         TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
         stopped = estimator_next_angle(&drive.run.estimator);
         rig_emf(0, (int16_t)(direction * (20 + gains_q12)));
@@ -570,7 +679,7 @@ void test_a_rotor_that_turns_slowly_in_a_long_question_turns_again_after_ten_deg
         asked(direction, 20);
         shaft->load = 0;
         drive.run.observer.load_q16 = (int32_t)direction * 700 * 65536;
-        steps(1u + 2u * HELD_ASK_STEPS);
+        steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS);
         stopped = estimator_next_angle(&drive.run.estimator);
         rig_emf(0, (int16_t)(direction * (20 + gains_q12)));
         while (shaft->phase == (uint16_t)HELD_ASKED && count < 100u) {
@@ -584,7 +693,7 @@ void test_a_rotor_that_turns_slowly_in_a_long_question_turns_again_after_ten_deg
         TEST_ASSERT_INT16_WITHIN(180, (int16_t)(direction * 1820), ahead); /* the flux is the header's */
         TEST_ASSERT_EQUAL_INT16((int16_t)(direction * 700), qm_hi(drive.run.observer.load_q16));
         asked(direction, (int16_t)(20 + gains_q12));
-        steps(1u + 2u * HELD_ASK_STEPS);
+        steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS);
         rig_emf(0, (int16_t)(direction * 20)); /* against the direction it does not go */
         (void)answered();
     }
@@ -595,7 +704,7 @@ void test_a_rotor_that_speeds_up_in_a_long_question_is_not_taken_for_one_that_st
     EACH_DIRECTION(direction) {
         float angle = 0.0F;
         asked(direction, 75);
-        steps(1);
+        steps(HELD_SETTLE_STEPS);
         for (int16_t n = 1; shaft->phase == (uint16_t)HELD_ASKED && n < 40; n++) {
             const int16_t q_q12 = (int16_t)(75 + 10 * n); /* fast enough to tell after eight steps, and one more would say that it stands */
             angle += (n > (int16_t)(2u * HELD_ASK_STEPS)) ? (float)q_q12 * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm() : 0.0F;
@@ -611,7 +720,7 @@ void test_the_first_steps_turn_right_after_a_question_began_anew_may_be_dead_tim
 {
     const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8);
     asked(1, 20);
-    steps(1u + 2u * HELD_ASK_STEPS);
+    steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS);
     rig_emf((int16_t)-more, 20);
     steps(HELD_ASK_STEPS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
@@ -666,8 +775,10 @@ void test_late_in_a_question_only_a_back_emf_that_turned_by_what_it_said_had_tur
     const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8); /* than dead time shakes it by */
     uint16_t count;
     asked(1, 40); /* too little to tell: it turns, or was let go */
-    steps(1u + HELD_ASK_STEPS + 1u);
+    steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS);
     rig_emf((int16_t)-more, 40);
+    steps(HELD_ASK_STEPS - 1u);
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
     steps(1);
     TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
     TEST_ASSERT_EQUAL_UINT16(2, shaft->stood);
@@ -706,7 +817,7 @@ void test_the_tail_of_the_filter_is_no_turn_of_a_rotor(void)
 {
     const int16_t gains_q12 = (int16_t)(params.adaptation.emf_least_q12 / 2);
     asked(1, 20);
-    steps(2);
+    steps(HELD_SETTLE_STEPS + 1u);
     rig_emf((int16_t)-gains_q12, (int16_t)(20 + gains_q12));
     steps(2u * HELD_ASK_STEPS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
