@@ -227,6 +227,18 @@ void test_an_application_that_returns_within_its_time_disturbs_nothing(void)
     TEST_ASSERT_EQUAL_INT16(1, board_drive.command.run);
 }
 
+void test_an_application_that_has_returned_serves_no_watchdog_and_is_not_late(void)
+{
+    starting();
+    served = host_watchdog_serves;
+    application_watch();
+    board_drive.ticks = (uint16_t)(board_drive.ticks + STOP_TICKS);
+    application_watch();
+    TEST_ASSERT_EQUAL_UINT16(served, host_watchdog_serves);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, board_drive.fault);
+    TEST_ASSERT_EQUAL_INT16(1, board_drive.command.run);
+}
+
 void test_a_late_application_ends_the_run_in_order_and_is_the_fault_once_the_drive_has_stopped(void)
 {
     starting();

@@ -215,6 +215,17 @@ void test_fault_that_was_kept_over_a_watchdog_reset_is_there_at_the_start(void)
     expect_fault(FAULT_STALL);
 }
 
+void test_the_fault_that_a_watchdog_reset_kept_is_that_of_the_record(void)
+{
+    start(0);
+    board_drive.fault = (uint16_t)FAULT_STALL;
+    healthy_ms(1);
+    RCON = 0x0010u;
+    start_with(lock);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, board_recorder.fault);
+    TEST_ASSERT_EQUAL_UINT16(0, board_recorder.left); /* complete */
+}
+
 void test_failed_clock_cannot_be_cleared_until_a_healthy_restart(void)
 {
     start(1);
