@@ -9,6 +9,15 @@ static uint16_t stuck_bits;
 #define SELFTEST_READ(cell) (*(cell))
 #define SELFTEST_WRITE(cell, value) (*(cell) = (uint16_t)(((cell) == stuck_word) ? (value) | stuck_bits : (value)))
 
+#include "board/firmware.h"
+#include "board/selftest_cpu.h"
+
+/* Where the RAM ends. */
+static volatile uint16_t *const whole_ram_end = BOARD_RAM_END;
+static volatile uint16_t *ram_end = BOARD_RAM_END;
+#undef BOARD_RAM_END
+#define BOARD_RAM_END ram_end
+
 #include "firmware/board/peripherals.c"
 #include "firmware/app/panel.c"
 #include "firmware/board/application.c"
@@ -227,6 +236,27 @@ void test_each_stuck_bit_of_the_drives_ram_is_found_while_running_and_at_a_start
     }
 }
 
+void test_the_last_words_are_tested_whatever_the_slices_before_leave_of_them(void)
+{
+    for (uint16_t less = 0; less < SLICE_WORDS; less++) {
+        setUp();
+        ram_end = whole_ram_end - less;
+        stuck_word = ram_end - 1;
+        stuck_bits = 0x0400u;
+        finds_it(SELFTEST_RAM, sizeof board_drive / 6u + 3u, "its last word");
+    }
+    ram_end = whole_ram_end;
+}
+
+void test_interrupts_are_on_again_after_the_tests_that_need_silence(void)
+{
+    board_ms(1);
+    owed_ms = 1;
+    firmware_background();
+    TEST_ASSERT_EQUAL_UINT16(0, owed_ms);
+    TEST_ASSERT_EQUAL_UINT16(0, SRbits.IPL);
+}
+
 void test_each_bit_of_flash_counts_and_so_does_its_crc(void)
 {
     static const uint32_t places[] = { 0, 1, 0x100, 0x1FFF, HOST_FLASH_WORDS - 3, HOST_FLASH_WORDS - 2, HOST_FLASH_WORDS - 1 };
@@ -349,6 +379,20 @@ void test_a_converter_that_does_not_read_ground_is_found_in_STOPPED_only(void)
     board_ms(1200); /* the potentiometer is needed */
     TEST_ASSERT_EQUAL_UINT16(SELFTEST_NONE, board_selftest_failed);
     TEST_ASSERT_EQUAL_HEX16(BOARD_AD1CHS0, AD1CHS0);
+}
+
+void test_the_converter_is_looked_at_neither_in_a_stop_nor_once_a_start_is_asked_for(void)
+{
+    static const struct {
+        uint16_t state, input;
+        int16_t run;
+    } cases[] = { { DRIVE_STOPPING, BOARD_AD1CHS0, 0 }, { DRIVE_STOPPED, BOARD_AD1CHS0, 1 }, { DRIVE_STOPPED, BOARD_AN_OFF, 0 } };
+    for (size_t n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        board_drive.state = cases[n].state;
+        board_drive.command.run = cases[n].run;
+        start_adc();
+        TEST_ASSERT_EQUAL_HEX16(cases[n].input, AD1CHS0);
+    }
 }
 
 void test_a_pass_that_is_late_and_the_next_at_once_accuse_no_register(void)
