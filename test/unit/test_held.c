@@ -110,6 +110,18 @@ void test_a_rotor_is_not_asked_where_no_resistance_explains_its_back_emf_nor_bef
     TEST_ASSERT_FALSE(held_angle_stands(shaft));
 }
 
+void test_a_rotor_at_exactly_half_of_the_reference_is_not_asked(void)
+{
+    EACH_DIRECTION(direction) {
+        at(direction, FAST_ERPM, FAST_ERPM / 2, 0, 200);
+        steps(100);
+        TEST_ASSERT_FALSE(held_angle_stands(shaft));
+        at(direction, FAST_ERPM, FAST_ERPM / 2 - 1, 0, 200);
+        steps(5);
+        TEST_ASSERT_TRUE(held_angle_stands(shaft));
+    }
+}
+
 void test_a_speed_that_is_half_the_reference_now_and_then_is_no_doubt(void)
 {
     at(1, FAST_ERPM, FAST_ERPM / 2 - 10, 0, 200);
@@ -929,6 +941,7 @@ void test_a_back_emf_against_the_direction_that_comes_while_the_current_grows_is
         steps(1);
         TEST_ASSERT_EQUAL_UINT16(HELD_STANDS, shaft->phase);
         TEST_ASSERT_LESS_THAN_INT16(known, qm_hi(drive.run.adaptation.rs_q31));
+        TEST_ASSERT_EQUAL_INT16(0, estimator_emf(&drive.run.estimator).d);
         TEST_ASSERT_EQUAL_INT16(0, estimator_emf(&drive.run.estimator).q);
         steps(HELD_REST_STEPS + HELD_ASK_STEPS - 1u);
         rig_emf(0, against_q12);

@@ -320,6 +320,27 @@ void test_probe_of_a_standing_rotor_stays_until_the_stall_and_that_of_a_turning_
     TEST_ASSERT_EQUAL_INT16(0, (probe(50, 20, 100), drive.run.probe_id_q13)); /* slow, but it turns */
 }
 
+void test_probe_of_a_rotor_at_exactly_half_of_the_reference_ends_and_of_one_below_stays(void)
+{
+    loaded(2.2F);
+    (void)probe(16, 0, 400);
+    rig_speed(5000);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(22, 100, 100), drive.run.probe_phase));
+    loaded(2.2F);
+    (void)probe(16, 0, 400);
+    rig_speed(4999);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(22, 100, 100), drive.run.probe_phase));
+}
+
+void test_probe_of_a_rotor_without_q_current_has_no_d_current(void)
+{
+    loaded(2.2F);
+    (void)probe(13, 0, 400);
+    drive.run.control.ref_q13.q = 0;
+    TEST_ASSERT_EQUAL_INT16(0, probe(5, 0, 400));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, drive.run.probe_phase);
+}
+
 void test_d_current_of_a_probe_rises_and_falls_by_an_eighth_of_the_largest_a_step(void)
 {
     const int16_t slope = (int16_t)(params.current_max_q13 >> 3);
