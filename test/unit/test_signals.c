@@ -315,6 +315,22 @@ void test_a_millisecond_more_or_less_of_a_turn_is_no_offset_however_large_the_ba
     }
 }
 
+void test_a_turn_is_whole_where_its_sine_leaves_the_negative_side_and_not_before(void)
+{
+    static const struct {
+        int16_t sine_q15;
+        uint16_t sums_ms;
+    } cases[] = { { -1, SIGNALS_TURNS_MS + 1u }, { 0, 0 } };
+    EACH(n, cases) {
+        drive.run.observer.omega_q16 = 1050 * 65536;
+        signals.sine_q15 = -100;
+        signals.emf_ms = SIGNALS_TURNS_MS;
+        drive.frame.sin = cases[n].sine_q15;
+        (void)signals_offset(&signals, &drive, &params);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].sums_ms, signals.emf_ms, golden_row(n));
+    }
+}
+
 void test_turns_that_a_millisecond_cannot_tell_from_a_standing_field_are_not_summed(void)
 {
     const int16_t above = (int16_t)(4 * params.adaptation.emf_least_q12);
@@ -446,6 +462,21 @@ void test_half_of_it_with_each_of_the_two_pointers_proves_nothing(void)
         signals_judge(&drive, &params);
     }
     TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}
+
+void test_an_innovation_counts_in_full_with_both_pointers_up_to_half_of_the_format(void)
+{
+    static const int16_t cases[][2] = { { 16382, 16382 }, { 16383, 16383 }, { 16384, 16383 }, { 32767, 16383 }, { -16383, -16383 }, { -32767, -16383 } };
+    EACH(n, cases) {
+        rig_closed(1, 10000);
+        drive.frame.cos = 0;
+        drive.frame.sin = -32768; /* half a turn of the second pointer: all of it along -cosine */
+        drive.run.observer.innovation_erpm = cases[n][0];
+        drive.run.observer.wrong_steps = 1;
+        signals_check(&drive, &params);
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(-cases[n][1], drive.run.evidence.twice.cosine, golden_row(n));
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(-cases[n][0], drive.run.evidence.once.sine, golden_row(n));
+    }
 }
 
 void test_a_rotor_that_all_but_stands_turns_with_no_pointer(void)
