@@ -350,6 +350,19 @@ void test_signal_in_the_outer_half_of_a_dead_end_is_a_broken_wire_after_100_ms(v
     }
 }
 
+void test_the_outer_half_of_a_dead_end_ends_at_a_count(void)
+{
+    static const struct {
+        uint16_t pot_q16, lost;
+    } cases[] = { { 3276, 1 }, { 3277, 0 }, { 65535 - 3277, 0 }, { 65535 - 3276, 1 } };
+    drive_params_t with = dead_ends();
+    EACH(n, cases) {
+        panel_reset();
+        the_pot.now_q15 = (int16_t)(cases[n].pot_q16 ^ 0x8000u);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].lost, pot_is_broken(&the_pot, &with, 100), golden_row(n));
+    }
+}
+
 void test_without_dead_ends_no_position_is_a_fault(void)
 {
     static const buttons_t nothing = { 0, 0, 500 };

@@ -450,3 +450,12 @@ void test_a_winding_above_it_burns_with_all_but_a_32nd_of_the_largest_current(vo
     EXACT(p.flux_brake_most_q13, CURRENT_Q13(PARAM_F(MAXIMUM_CURRENT_A) * 31.0F / 32.0F));
     TEST_ASSERT_INT16_WITHIN(1, p.current_max_q13 - p.current_max_q13 / 32, p.flux_brake_most_q13);
 }
+
+void test_dead_ends_of_the_potentiometer_are_rounded_to_the_nearest_count(void)
+{
+#undef POT_LIVE_ZERO
+#define POT_LIVE_ZERO 0.16
+    static const drive_params_t p = DRIVE_PARAMS_INIT;
+    EXACT(p.pot_zero_q16, 10486);  /* 10485.8 */
+    EXACT(p.pot_scale_q15, 48188); /* 1 / 0.68: 48188.2 */
+}

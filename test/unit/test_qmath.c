@@ -158,3 +158,11 @@ void test_difference_and_mean_are_those_of_17_bits_at_every_edge(void)
         }
     }
 }
+
+void test_zero_has_the_positive_sign(void)
+{
+    static const int16_t cases[][2] = { { -32768, -7 }, { -1, -7 }, { 0, 7 }, { 1, 7 }, { 32767, 7 } };
+    for (unsigned n = 0; n < sizeof cases / sizeof cases[0]; n++) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][1], qm_with_sign(7, cases[n][0]), golden_row(n));
+    }
+}

@@ -199,6 +199,19 @@ void test_first_period_with_the_law_is_whole_in_an_even_and_an_odd_one(void)
     }
 }
 
+void test_ramp_of_a_rotor_that_turns_begins_a_quarter_turn_behind_its_angle(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t estimated;
+        rig_closed(direction, (int16_t)(direction * 5000));
+        drive.state = (uint16_t)DRIVE_STOPPING;
+        estimated = estimator_next_angle(&drive.run.estimator);
+        startup_ramp_from_here(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16(DRIVE_RAMP, drive.state);
+        TEST_ASSERT_EQUAL_HEX16((angle_t)(estimated - (angle_t)(direction * 0x4000)), (angle_t)(drive.forced.angle_q32 >> 16));
+    }
+}
+
 void test_ramp_carries_the_open_loop_current(void)
 {
     EACH_DIRECTION(direction) {

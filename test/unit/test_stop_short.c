@@ -79,6 +79,14 @@ void test_a_load_that_turns_the_rotor_too_fast_is_an_over_current(void)
     EXPECT_DRIVE(DRIVE_FAULT, FAULT_OVERCURRENT_SW, "a phase");
 }
 
+void test_its_current_is_half_the_stator_s_vector_in_each_axis(void)
+{
+    rig_currents(2000, 0); /* alpha twice the current, beta over the root of three */
+    rig_tick(1);
+    TEST_ASSERT_EQUAL_INT16(2000, drive.run.control.i_q13.d);
+    TEST_ASSERT_INT16_WITHIN(2, 1155, drive.run.control.i_q13.q);
+}
+
 void test_its_current_heats_the_winding_in_I2t(void)
 {
     static overload_t heat;
