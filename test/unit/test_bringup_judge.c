@@ -192,6 +192,35 @@ void test_an_eighth_of_the_current_is_a_signal(void)
     }
 }
 
+void test_a_signal_of_exactly_an_eighth_tells_its_leg_whatever_its_sign(void)
+{
+    static const uint16_t to[3] = { 0, 4, 2 }, back[3] = { 3, 1, 5 }; /* directions +A, +C, +B and their opposites */
+    static const struct {
+        int16_t size;
+        uint16_t leg;
+    } cases[] = { { BRINGUP_LEAST_Q13, 2 }, { -BRINGUP_LEAST_Q13, 2 }, { BRINGUP_LEAST_Q13 - 1, 0 }, { 1 - BRINGUP_LEAST_Q13, 0 } }; /* else the expected one */
+    EACH(n, cases) {
+        bringup_level_t x = level(&right, full_a, 300);
+        for (uint16_t k = 0; k < 3u; k++) {
+            x.a[to[k]] = (current_q13_t)((k == 1u) ? cases[n].size : -cases[n].size);
+            x.a[back[k]] = (current_q13_t)-x.a[to[k]];
+        }
+        TEST_ASSERT_EQUAL_UINT16(cases[n].leg, bringup_wiring(&x).leg[0]);
+    }
+}
+
+void test_equal_signals_are_a_ratio_of_100_percent_exactly(void)
+{
+    bringup_level_t half = level(&right, 0.4F, 150), full = level(&right, 0.8F, 300);
+    bringup_wiring_t w = bringup_wiring(&full);
+    TEST_ASSERT_EQUAL_UINT16(100, bringup_bridge(&half, &full, &w, 2400).b_percent_of_a);
+    full.a[1] = 1000;
+    full.a[4] = -1000;
+    full.b[1] = 750;
+    full.b[4] = -750;
+    TEST_ASSERT_EQUAL_UINT16(75, bringup_bridge(&half, &full, &w, 2400).b_percent_of_a);
+}
+
 void test_dead_time_is_the_mean_of_both_legs(void)
 {
     bringup_level_t half = level(&right, 0.4F, amplitude(0.4F, 2.67F, 1.0F)), full = level(&right, 0.8F, amplitude(0.8F, 2.67F, 1.0F));

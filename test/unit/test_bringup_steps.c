@@ -254,6 +254,20 @@ void test_a_fault_input_may_come_back_slowly(void)
     TEST_ASSERT_TRUE(found(BRINGUP_FAULT_LOW));
 }
 
+void test_a_fault_is_waited_for_the_whole_time_from_its_clear(void)
+{
+    uint16_t n = 0;
+    until(BRINGUP_STEP_FAULT_REST);
+    bringup_go(&guide, BRINGUP_STEP_FAULT_REST);
+    guide.waited_ms = 77; /* before the clear */
+    ms(1);
+    while (guide.step == (uint16_t)BRINGUP_STEP_FAULT_REST && n < 1000u) {
+        ms(1);
+        n++;
+    }
+    TEST_ASSERT_EQUAL_UINT16(CLEAR_MS, n);
+}
+
 void test_a_bridge_that_will_not_start_ends_it(void)
 {
     until(BRINGUP_STEP_CURRENT);
@@ -311,6 +325,20 @@ void test_six_directions_are_shown_with_voltage_and_both_currents(void)
         TEST_ASSERT_INT32_WITHIN(15, shares[n][1] * unit_ma, m->high);
         TEST_ASSERT_INT32_WITHIN(8, (int32_t)(0.1F * rs_ohm * (float)along_ma) + 128, m->value); /* and 4/3 of 0.96 V */
     }
+}
+
+void test_the_six_directions_are_sixths_of_a_turn(void)
+{
+    uint16_t seen = 0;
+    until(BRINGUP_STEP_DRIVE);
+    for (uint16_t n = 0; n < 20000u && guide.step == (uint16_t)BRINGUP_STEP_DRIVE; n++) {
+        ms(1);
+        if (guide.step == (uint16_t)BRINGUP_STEP_DRIVE && guide.phase >= 2u) {
+            TEST_ASSERT_EQUAL_UINT16((guide.index * 65536ul + 3u) / 6u, drive.run.bringup.angle);
+            seen |= (uint16_t)(1u << guide.index);
+        }
+    }
+    TEST_ASSERT_EQUAL_HEX16(0x3F, seen);
 }
 
 void test_what_is_measured_of_a_right_bridge(void)
