@@ -323,6 +323,15 @@ void test_search_doubles_the_voltage_then_the_length_and_ends_at_a_sixth_of_the_
     TEST_ASSERT_EQUAL_UINT16(IDENTIFY_RESULT_L_RANGE, finished(IDENTIFY_TRY_D));
 }
 
+void test_the_largest_square_voltage_and_the_bias_are_seven_eighths_of_the_circle(void)
+{
+    static const int16_t biases[] = { 0, 1000, 5000 };
+    EACH(n, biases) {
+        id->bias_q14 = biases[n];
+        TEST_ASSERT_INT16_WITHIN(1, (int16_t)(7 * (int32_t)drive.circle.limit_q14 / 8), (int16_t)(square_most(&drive) + biases[n]));
+    }
+}
+
 void test_search_starts_with_a_128th_of_the_circle_and_on_the_q_axis_with_half_the_square_of_the_d_axis(void)
 {
     control->v_q14.d = 3000;
@@ -411,6 +420,22 @@ void test_half_speed_is_followed_by_full_speed(void)
     TEST_ASSERT_UINT32_WITHIN(4000, 7240000ul, id->kphi_half);
     TEST_ASSERT_EQUAL_UINT32(0, id->values.kphi_uv_per_krpm);
     TEST_ASSERT_EQUAL_UINT16(0, id->blocks);
+    TEST_ASSERT_EQUAL_INT32(0, id->emf_d_sum);
+    TEST_ASSERT_EQUAL_INT32(0, id->emf_q_sum);
+}
+
+void test_full_speed_follows_where_twice_the_voltage_is_fifteen_sixteenths_of_the_circle_exactly(void)
+{
+    static const struct {
+        int16_t limit_q14;
+        identify_result_t result;
+    } cases[] = { { 5491, IDENTIFY_RESULT_BUSY }, { 5490, IDENTIFY_RESULT_VOLTAGE_LIMIT } }; /* 5148 and 5147 */
+    EACH(n, cases) {
+        begin_spin(IDENTIFY_SPIN_HALF, 2670, 1920);
+        drive.circle.limit_q14 = cases[n].limit_q14;
+        stretches(256, 0, 2574, 0, 0);
+        TEST_ASSERT_EQUAL_UINT16(cases[n].result, id->result);
+    }
 }
 
 void test_stretches_agree_when_they_lie_within_41_degrees_to_both_sides_and_swinging_does_not_shorten_the_mean(void)
@@ -657,6 +682,64 @@ void test_an_inertia_or_friction_beyond_the_range_is_named_and_not_a_value(void)
     }
 }
 
+void test_the_least_acceleration_has_an_inertia_and_none_has_not(void)
+{
+    identify_part_t *push = &id->parts[PART_PUSH];
+    begin_mechanics(0);
+    for (uint16_t part = 0; part < 3u; part++) {
+        const identify_part_t whole = { 64, (part == (uint16_t)PART_PUSH) ? 64 * 32 * 2000l : 0, 64 * 16000l, 0, 262080l, 63, 2520 };
+        id->parts[part] = whole;
+    }
+    TEST_ASSERT_EQUAL_INT32(0, part_rate(push));
+    TEST_ASSERT_EQUAL_UINT32(0, inertia(id));
+    while (part_rate(push) == 0) {
+        push->slope++;
+    }
+    TEST_ASSERT_EQUAL_INT32(1, part_rate(push));
+    TEST_ASSERT_GREATER_THAN_UINT32(0, inertia(id));
+}
+
+void test_what_a_light_rotor_s_first_cycle_has_seen_of_its_coasting_does_not_count(void)
+{
+    for (uint16_t heavy = 0; heavy < 2u; heavy++) {
+        begin_mechanics(0);
+        for (uint16_t part = 0; part < 3u; part++) {
+            id->parts[part].periods = 1000;
+        }
+        id->heavy = heavy;
+        first_cycle_done(id, id->top_q10);
+        TEST_ASSERT_EQUAL_INT32(1000, id->parts[PART_PUSH].periods);
+        TEST_ASSERT_EQUAL_INT32(heavy ? 1000 : 0, id->parts[PART_FAST].periods);
+        TEST_ASSERT_EQUAL_INT32(heavy ? 1000 : 0, id->parts[PART_SLOW].periods);
+    }
+}
+
+void test_a_rotor_coasts_down_to_three_eighths_of_the_top_speed_and_a_count_further(void)
+{
+    begin_mechanics(0);
+    id->coasting = 1;
+    coast_block(&drive, bottom_of(id));
+    TEST_ASSERT_EQUAL_UINT16(1, id->coasting);
+    TEST_ASSERT_EQUAL_UINT16(0, id->cycles);
+    coast_block(&drive, bottom_of(id) - 1);
+    TEST_ASSERT_EQUAL_UINT16(0, id->coasting);
+    TEST_ASSERT_EQUAL_UINT16(1, id->cycles);
+}
+
+void test_a_push_begins_at_the_speed_of_the_last_stretch_before_it_if_that_was_less(void)
+{
+    int32_t before_q10;
+    begin_mechanics(0);
+    before_q10 = id->seen_q10 / 2;
+    set_sums(before_q10 * 32, 0, 0, 0);
+    (void)finished(IDENTIFY_MECHANICS);
+    mechanics_current(&drive, id->push_q13);
+    set_sums((before_q10 + 1000) * 32, 0, 0, 0);
+    (void)finished(IDENTIFY_MECHANICS);
+    TEST_ASSERT_EQUAL_UINT16(1, id->phase_blocks);
+    TEST_ASSERT_EQUAL_INT32(before_q10 - (before_q10 >> 3), id->first_q10);
+}
+
 void test_friction_that_does_not_grow_is_constant_and_one_that_begins_below_zero_grows_from_zero(void)
 {
     static const int32_t cases[][4] = { /* slopes of slow and fast, and what comes of it: more than nothing? */
@@ -728,6 +811,17 @@ void test_the_first_push_is_what_friction_takes_and_a_sixteenth(void)
     TEST_ASSERT_INT16_WITHIN(3, (int16_t)((float)params.open_loop_q13 * (0.2425F + 0.0625F)), id->push_q13);
     begin_mechanics(-1287);
     TEST_ASSERT_EQUAL_INT16(params.open_loop_q13 >> 4, id->push_q13);
+}
+
+void test_the_first_push_of_a_rotor_without_friction_is_a_sixteenth_exactly(void)
+{
+    drive_params_t strong = params;
+    strong.open_loop_q13 = 6000;
+    begin_spin(IDENTIFY_SPIN_FULL, 267, 1920);
+    id->emf_sum = 2000ul << BLOCKS_LOG2;
+    id->emf_d_sum = 0;
+    mechanics_start(&drive, &strong);
+    TEST_ASSERT_EQUAL_INT16(375, id->push_q13);
 }
 
 void test_top_speed_is_twice_END_SPEED_RPM_within_seven_eighths_of_the_voltage(void)
@@ -821,6 +915,25 @@ void test_each_axis_has_its_own_gain(void)
     TEST_ASSERT_EQUAL_INT16(300, v.q);
     TEST_ASSERT_EQUAL_INT32(100, control->pi_d.sum);
     TEST_ASSERT_EQUAL_INT32(200, control->pi_q.sum);
+}
+
+void test_both_integrators_give_back_all_but_a_thousandth_of_an_excess(void)
+{
+    const dq_t none = { 0, 0 };
+    int32_t most_d, most_q;
+    id->mode = (uint16_t)IDENTIFY_CURRENT;
+    id->shift = 10;
+    id->kp_d = 1024;
+    id->kp_q = 1024;
+    most_d = (int32_t)drive.circle.vd_most_q14 * 1024;
+    most_q = (int32_t)vq_limit(&drive.circle, drive.circle.vd_most_q14) * 1024;
+    control->pi_d.sum = most_d + 6553600l;
+    control->pi_q.sum = most_q + 6553600l;
+    control->ref_q13 = none;
+    control->i_q13 = none;
+    (void)identify_voltage(&drive, 1);
+    TEST_ASSERT_INT32_WITHIN(300, 6700, control->pi_d.sum - most_d);
+    TEST_ASSERT_INT32_WITHIN(300, 6700, control->pi_q.sum - most_q);
 }
 
 /* ---- Hand-over between interrupt and background ---- */
