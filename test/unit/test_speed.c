@@ -60,6 +60,29 @@ void test_reference_falls_by_its_own_slope_in_both_directions_and_in_a_stop(void
     }
 }
 
+void test_the_slope_is_that_of_a_fall_only_on_the_way_to_less_speed(void)
+{
+    static const struct {
+        int16_t reference_erpm, target_erpm, falls;
+    } cases[] = { { 10000, 9999, 1 }, { 10000, 10000, 0 }, { 10000, 10001, 0 }, { -10000, -9999, 1 }, { -10000, -10000, 0 }, { -10000, -10001, 0 },
+                  { 0, 100, 0 }, { 1, 100, 0 }, { -1, -100, 0 }, { 1, 0, 1 }, { -1, 0, 1 } };
+    drive_params_t gentle = params;
+    gentle.speed_decel_q16 = 2 * 65536;
+    EACH(n, cases) {
+        TEST_ASSERT_EQUAL_INT32_MESSAGE(cases[n].falls ? 2 * 65536 : params.speed_ramp_q16,
+                                        reference_slope(&gentle, cases[n].reference_erpm, cases[n].target_erpm), golden_row(n));
+    }
+}
+
+void test_a_reference_says_that_it_waits_and_one_at_its_target_waits_for_nobody(void)
+{
+    (void)step(1, 20000, 10000 - 1750);
+    TEST_ASSERT_EQUAL_UINT16(1, drive.run.control.ramp_waits);
+    drive.command.target_erpm = 10000;
+    speed_reference_step(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(0, drive.run.control.ramp_waits);
+}
+
 void test_without_a_slope_of_its_own_the_reference_falls_as_it_rises(void)
 {
     TEST_ASSERT_EQUAL_INT32(params.speed_ramp_q16, params.speed_decel_q16);
@@ -106,6 +129,35 @@ void test_current_is_rounded_to_the_nearest_count(void)
     EACH(n, cases) {
         TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][1], current((int16_t)(10000 + cases[n][0]), 10000, 0), golden_row(n));
     }
+}
+
+void test_current_is_rounded_where_exactly_half_a_count_is_reached(void)
+{
+    rig_closed(1, 10000);
+    drive.run.control.speed_kp_q13 = 1;
+    TEST_ASSERT_EQUAL_INT16(0, current(10000 + 4095, 10000, 0));
+    TEST_ASSERT_EQUAL_INT16(1, current(10000 + 4096, 10000, 0));
+}
+
+void test_current_reaches_its_limit_to_the_count(void)
+{
+    rig_closed(1, 10000);
+    drive.run.control.speed_kp_q13 = 32767;
+    drive.run.control.iq_limit_q13 = 5120;
+    TEST_ASSERT_EQUAL_INT16(5120, current(20000, 10000, 0));
+    TEST_ASSERT_EQUAL_INT16(-5120, current(0, 10000, 0));
+}
+
+void test_steps_hand_on_the_last_bit(void)
+{
+    int16_t sum = 0;
+    rig_closed(1, 10000);
+    drive.run.control.speed_kp_q13 = 1;
+    (void)current(10000, 10000, 0);
+    for (uint16_t n = 0; n < 8192u; n++) {
+        sum = (int16_t)(sum + speed_current_step(&drive.run, &params, 10001));
+    }
+    TEST_ASSERT_EQUAL_INT16(1, sum);
 }
 
 /* A count of current turns a light rotor out of its speed: the mean of the steps is finer than a count. */
@@ -178,6 +230,39 @@ void test_trim_waits_while_the_load_s_estimate_moves_against_the_error(void)
     }
 }
 
+void test_trim_waits_for_the_load_s_estimate_at_an_error_of_one_too(void)
+{
+    rig_closed(1, 10000);
+    (void)trim_after_at(100, 9999, 9998);
+    TEST_ASSERT_EQUAL_INT32(0, drive.run.control.iq_trim_q26);
+    (void)trim_after_at(100, 9999, 10000);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.run.control.iq_trim_q26);
+}
+
+void test_trim_stands_still_where_nothing_lacks_and_takes_up_nearly_an_eighth_of_the_speed(void)
+{
+    EACH_DIRECTION(sign) {
+        rig_closed(1, 10000);
+        (void)trim_after(1000, 10000);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.control.iq_trim_q26);
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(sign * 312), trim_after(64, (int16_t)(10000 - sign * 1249)));
+    }
+}
+
+void test_trim_step_goes_by_the_q_current_that_is_asked_for(void)
+{
+    rig_closed(1, 10000);
+    turn_at(9900, 9900);
+    drive.run.control.trim_reference_erpm = 10000;
+    drive.run.control.vq_limit_q14 = 30000;
+    speed_trim_step(&drive, &params);
+    TEST_ASSERT_GREATER_THAN_INT32(0, drive.run.control.iq_trim_q26);
+    drive.run.control.iq_trim_q26 = 256L * 8192;
+    drive.run.control.ref_q13.q = drive.run.control.iq_limit_q13;
+    speed_trim_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT32(254L * 8192, drive.run.control.iq_trim_q26);
+}
+
 /** A speed that is far off to one side and the other, so many steps each. @return the trim in whole counts */
 static int16_t trim_of_swings(uint16_t swings, uint16_t steps, int16_t low_erpm, int16_t high_erpm)
 {
@@ -231,6 +316,19 @@ void test_a_load_step_is_no_swing_and_neither_are_small_errors_or_one_side(void)
         (void)trim_of_swings(cases[n].swings, cases[n].steps, cases[n].low_erpm, cases[n].high_erpm);
         TEST_ASSERT_FALSE_MESSAGE(speed_swings(&drive.run), cases[n].what);
     }
+}
+
+void test_a_swing_is_one_whatever_its_bits_and_counts_to_four(void)
+{
+    rig_closed(1, 10000);
+    drive.run.control.swung_erpm = 1000;
+    (void)trim_after(1, 10000 + 1001);
+    TEST_ASSERT_EQUAL_UINT16(SPEED_SWING_STEPS, drive.run.control.swing_steps);
+    TEST_ASSERT_EQUAL_INT16(-1001, drive.run.control.swung_erpm);
+    drive.run.control.swing_steps = 4u * SPEED_SWING_STEPS;
+    (void)trim_after(1, 10000 - 1000);
+    TEST_ASSERT_EQUAL_INT16(1000, drive.run.control.swung_erpm);
+    TEST_ASSERT_EQUAL_UINT16(4u * SPEED_SWING_STEPS, drive.run.control.swing_steps);
 }
 
 void test_swings_are_forgotten_in_an_eighth_of_a_second_and_not_remembered_for_longer(void)
@@ -349,6 +447,15 @@ void test_stop_never_asks_for_a_speed_without_a_gain(void)
     }
 }
 
+void test_there_is_no_gain_where_neither_reference_nor_rotor_turns(void)
+{
+    rig_closed(1, 10000);
+    drive.run.control.reference_erpm = 0;
+    rig_speed(0);
+    speed_schedule(&drive.run, &params);
+    TEST_ASSERT_EQUAL_INT16(0, drive.run.control.speed_kp_q13);
+}
+
 /* ---- the sample's delay ---- */
 
 void test_q_current_is_raised_by_what_the_back_emf_took_before_the_sample(void)
@@ -440,5 +547,41 @@ void test_reference_keeps_the_fraction_of_a_slow_ramp(void)
             speed_reference_step(&drive, &slow);
         }
         TEST_ASSERT_EQUAL_INT16(direction * 5300, drive.run.control.reference_erpm);
+    }
+}
+
+/* ---- a stop goes on, a run is to turn ---- */
+
+void test_a_run_is_to_turn_by_the_sign_of_its_target_alone(void)
+{
+    static const struct {
+        int16_t direction, target_erpm;
+        drive_state_t state;
+    } cases[] = { { 1, 1, DRIVE_CLOSED }, { 1, 0, DRIVE_CLOSED }, { 1, -1, DRIVE_STOPPING }, { 1, -2, DRIVE_STOPPING },
+                  { -1, -1, DRIVE_CLOSED }, { -1, 0, DRIVE_STOPPING }, { -1, 1, DRIVE_STOPPING } };
+    EACH(n, cases) {
+        rig_closed(cases[n].direction, (int16_t)(cases[n].direction * 10000));
+        drive.command.run = 1;
+        drive.command.target_erpm = cases[n].target_erpm;
+        speed_choose_state(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].state, drive.state, golden_row(n));
+    }
+}
+
+void test_a_stop_that_goes_on_forgets_a_load_that_drove_and_no_other(void)
+{
+    EACH_DIRECTION(direction) {
+        const struct {
+            int32_t load_q16, after_q16;
+        } cases[] = { { direction * -65536L, 0 }, { direction * -700L * 65536, 0 }, { direction * 65536L, direction * 65536L }, { 30000, 30000 } };
+        EACH(n, cases) {
+            rig_closed(direction, (int16_t)(direction * 10000));
+            drive.state = (uint16_t)DRIVE_STOPPING;
+            drive.command.run = 1;
+            drive.run.observer.load_q16 = cases[n].load_q16;
+            speed_choose_state(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16(DRIVE_CLOSED, drive.state);
+            TEST_ASSERT_EQUAL_INT32_MESSAGE(cases[n].after_q16, drive.run.observer.load_q16, golden_row(n));
+        }
     }
 }

@@ -69,6 +69,15 @@ void test_it_lasts_as_long_as_current_flows_and_20_ms_more(void)
     }
 }
 
+void test_it_goes_by_the_currents_that_are_measured(void)
+{
+    rig_currents(40, 40); /* 80 in the third phase, which has no shunt */
+    TEST_ASSERT_LESS_OR_EQUAL_UINT16(STANDS_PERIODS, rig_tick_until(DRIVE_STOPPED, 1000));
+    brake();
+    rig_currents(40, -80);
+    TEST_ASSERT_EQUAL_UINT16(1001, rig_tick_until(DRIVE_STOPPED, 1000));
+}
+
 void test_a_load_that_turns_the_rotor_too_fast_is_an_over_current(void)
 {
     rig_currents(params.overcurrent_q13, 0);
