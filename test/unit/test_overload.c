@@ -110,3 +110,23 @@ void test_largest_vector_for_ever_keeps_to_the_format(void)
     }
     TEST_ASSERT_INT32_WITHIN(8, 0x40000000, overload.heat_q25);
 }
+
+void test_a_heat_of_exactly_its_limit_is_too_much(void)
+{
+    overload.heat_q25 = p.i2t_most_q25;
+    TEST_ASSERT_EQUAL_UINT16(1, overload_tick(&overload, &drive, &p, 1));
+    overload.heat_q25 = p.i2t_most_q25 - 1;
+    TEST_ASSERT_EQUAL_UINT16(0, overload_tick(&overload, &drive, &p, 1));
+}
+
+void test_a_winding_that_rests_cools_by_the_rate_to_the_bit_and_sums_nothing(void)
+{
+    drive.state = (uint16_t)DRIVE_STOPPED;
+    p.i2t_rate_q16 = 32768;
+    overload.heat_q25 = 40000;
+    (void)overload_tick(&overload, &drive, &p, OVERLOAD_STEP_MS - 1u);
+    TEST_ASSERT_EQUAL_UINT32(0, overload.sum);
+    (void)overload_tick(&overload, &drive, &p, 1);
+    TEST_ASSERT_EQUAL_INT32(20000, overload.heat_q25);
+    TEST_ASSERT_EQUAL_UINT32(0, overload.sum);
+}

@@ -52,6 +52,16 @@ void test_overcurrent_trips_in_every_state_with_the_bridge_on_and_in_no_other(vo
     EXPECT_DRIVE(DRIVE_STOPPED, FAULT_NONE, "bridge off");
 }
 
+void test_the_check_of_the_current_tells_whether_it_has_tripped(void)
+{
+    rig_closed(1, 10000);
+    drive.phases_q13.a = params.overcurrent_q13;
+    TEST_ASSERT_EQUAL_UINT16(0, protection_check_current(&drive, &params));
+    drive.phases_q13.a = (int16_t)(params.overcurrent_q13 + 1);
+    TEST_ASSERT_EQUAL_UINT16(1, protection_check_current(&drive, &params));
+    TEST_ASSERT_EQUAL_UINT16(FAULT_OVERCURRENT_SW, drive.fault);
+}
+
 void test_overcurrent_uses_the_current_without_its_offset(void)
 {
     rig_currents(1000, 0);
@@ -269,6 +279,26 @@ void test_estimator_that_slips_past_the_rotor_has_lost_it_though_each_loss_is_sh
     }
 }
 
+void test_of_a_lost_rotor_a_stall_is_named_only_where_it_has_lasted_too_long(void)
+{
+    rig_closed(1, 10000);
+    rig_emf(2000, 1000);
+    drive.run.stall_steps = (uint16_t)(params.stall_steps + STALL_FALL); /* falls to what is not too long */
+    drive.run.lost_lock_steps = params.lost_lock_steps;
+    protection_check_rotor(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_LOST_LOCK, drive.fault);
+}
+
+void test_as_many_steps_out_of_lock_as_may_be_are_no_fault(void)
+{
+    rig_closed(1, 10000);
+    rig_emf(1000, 2000);
+    drive.run.lost_lock_steps = (uint16_t)(params.lost_lock_steps + 1u);
+    protection_check_rotor(&drive, &params);
+    TEST_ASSERT_EQUAL_UINT16(params.lost_lock_steps, drive.run.lost_lock_steps);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_NONE, drive.fault);
+}
+
 /* ---- a rotor that may stand ---- */
 
 /** Seldom steps of the probe with this back-EMF; the d current goes on. @return the largest d current seen */
@@ -330,6 +360,49 @@ void test_probe_of_a_rotor_at_exactly_half_of_the_reference_ends_and_of_one_belo
     (void)probe(16, 0, 400);
     rig_speed(4999);
     TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(22, 100, 100), drive.run.probe_phase));
+}
+
+void test_probe_sees_no_turn_in_a_back_emf_whose_d_part_is_a_quarter(void)
+{
+    loaded(2.2F);
+    (void)probe(16, 0, 400);
+    rig_speed(4000);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(100, 25, 100), drive.run.probe_phase));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(25, 24, 100), drive.run.probe_phase));
+}
+
+void test_without_current_a_rotor_is_doubtful_up_to_what_dead_time_may_make(void)
+{
+    loaded(0.0F);
+    EACH_DIRECTION(sign) {
+        rig_emf(0, (int16_t)(sign * params.adaptation.emf_least_q12));
+        TEST_ASSERT_EQUAL_UINT16(1, protection_rotor_is_doubtful(&drive.run, &params));
+        rig_emf(0, (int16_t)(sign * (params.adaptation.emf_least_q12 + 1)));
+        TEST_ASSERT_EQUAL_UINT16(0, protection_rotor_is_doubtful(&drive.run, &params));
+    }
+}
+
+void test_a_probe_waits_anew_after_a_step_below_half_of_the_reference(void)
+{
+    loaded(2.2F);
+    rig_speed(5000);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(12, 0, 400), drive.run.probe_phase));
+    rig_speed(4999);
+    (void)probe(1, 0, 400);
+    rig_speed(5000);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(12, 0, 400), drive.run.probe_phase));
+    TEST_ASSERT_EQUAL_UINT16(PROBE_TEST, (probe(1, 0, 400), drive.run.probe_phase));
+}
+
+void test_three_quarters_of_the_reference_are_no_dip(void)
+{
+    loaded(2.2F);
+    (void)probe(38, 0, 400);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, drive.run.probe_phase);
+    rig_speed(7500);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_PAUSE, (probe(20, 0, 400), drive.run.probe_phase));
+    rig_speed(7499);
+    TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, (probe(6, 0, 400), drive.run.probe_phase));
 }
 
 void test_probe_of_a_rotor_without_q_current_has_no_d_current(void)
