@@ -73,7 +73,7 @@ void test_the_angle_stops_after_two_steps_far_below_the_reference_and_after_five
         static const struct {
             int16_t speed_erpm;
             uint16_t steps;
-        } cases[] = { { FAST_ERPM / 8 - 10, 2 }, { -FAST_ERPM, 2 }, { FAST_ERPM / 8 + 10, 5 }, { FAST_ERPM / 2 - 10, 5 }, { FAST_ERPM / 2 + 10, 1000 } };
+        } cases[] = { { FAST_ERPM / 8 - 10, 2 }, { FAST_ERPM / 8 - 1, 2 }, { -FAST_ERPM, 2 }, { FAST_ERPM / 8, 5 }, { FAST_ERPM / 8 + 10, 5 }, { FAST_ERPM / 2 - 10, 5 }, { FAST_ERPM / 2 + 10, 1000 } };
         EACH(n, cases) {
             uint16_t count = 0;
             at(direction, FAST_ERPM, cases[n].speed_erpm, 0, 200);
@@ -152,6 +152,88 @@ void test_the_frame_is_ahead_by_the_speed_times_the_filter_s_time(void)
     drive.run.model.kfilter_esdq_q16 = 256;
     TEST_ASSERT_EQUAL_INT16(32767, held_lead(&drive.run, &params, 30000)); /* never more than half a turn */
     TEST_ASSERT_EQUAL_INT16(0, held_lead(&drive.run, &params, 0));
+}
+
+void test_neither_observer_nor_estimator_has_a_speed_where_the_angle_stops_and_both_turn_back(void)
+{
+    EACH_DIRECTION(direction) {
+        uint32_t rho_q32;
+        angle_t next;
+        at(direction, FAST_ERPM, 100, 0, 0);
+        shaft->emf_q12.q = (int16_t)(direction * 900);
+        rho_q32 = drive.run.estimator.rho_q32;
+        next = estimator_next_angle(&drive.run.estimator);
+        steps(2);
+        TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.observer.omega_q16);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.estimator.omega_filtered_q16);
+        TEST_ASSERT_EQUAL_HEX32((uint32_t)(angle_t)(next - estimator_next_angle(&drive.run.estimator)) << 16,
+                                qm_turn_sub(rho_q32, drive.run.estimator.rho_q32));
+    }
+}
+
+void test_an_estimator_that_goes_on_has_neither_a_lag_nor_an_innovation_in_the_gate(void)
+{
+    EACH_DIRECTION(direction) {
+        stands(direction, 200);
+        steps(HELD_ASK_STEPS);
+        shaft->lag_q12 = 500;
+        drive.run.observer.gate_level = 50;
+        rig_emf(0, (int16_t)(direction * (params.adaptation.emf_least_q12 + 20)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        TEST_ASSERT_EQUAL_INT16(0, shaft->lag_q12);
+        TEST_ASSERT_EQUAL_INT32(0, drive.run.observer.gate_level);
+        rig_speed((int16_t)(direction * (FAST_ERPM / 2 - 1)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+        rig_speed((int16_t)(direction * (FAST_ERPM / 2)));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase); /* it is back */
+    }
+}
+
+void test_a_step_at_its_speed_in_which_nothing_changes_fast_forgets_lag_and_doubts(void)
+{
+    at(1, FAST_ERPM, FAST_ERPM, 30, 3000);
+    drive.run.observer.fast_share_q15 = 0;
+    drive.run.observer.load_q16 = 77 * 65536;
+    shaft->lag_q12 = 500;
+    shaft->doubts = 3;
+    shaft->emf_q12.d = 0;
+    shaft->emf_q12.q = 0;
+    held_step(&drive, &params);
+    TEST_ASSERT_EQUAL_INT16(77, shaft->load);
+    TEST_ASSERT_EQUAL_INT16(0, shaft->lag_q12);
+    TEST_ASSERT_EQUAL_UINT16(0, shaft->doubts);
+    TEST_ASSERT_EQUAL_INT16(30, shaft->emf_q12.d);
+    TEST_ASSERT_EQUAL_INT16(3000, shaft->emf_q12.q);
+    TEST_ASSERT_EQUAL_UINT16(0, shaft->steps);
+}
+
+void test_a_shaft_that_is_forgotten_has_neither_stood_nor_anything_to_do(void)
+{
+    stands(1, 200);
+    shaft->act = (uint16_t)HELD_LEARN;
+    shaft->doubts = 3;
+    held_forget(shaft);
+    TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase);
+    TEST_ASSERT_EQUAL_UINT16(HELD_WAITS, shaft->act);
+    TEST_ASSERT_EQUAL_UINT16(0, shaft->stood);
+    TEST_ASSERT_EQUAL_UINT16(0, shaft->doubts);
+    TEST_ASSERT_EQUAL_UINT16(0, shaft->steps);
+}
+
+void test_the_field_is_weakened_for_the_reference_once_half_of_it_is_reached_and_for_twice_the_speed_before(void)
+{
+    const int16_t from = params.fieldweak.on_speed_erpm;
+    const int16_t cases[][3] = { /* reference, speed, what the field is weakened for */
+                                 { from, 0, from }, { (int16_t)(from - 1), 0, (int16_t)(from - 1) }, { 20000, 0, from }, { 20000, (int16_t)(from >> 1), from },
+                                 { 20000, (int16_t)((from >> 1) + 1), (int16_t)(2 * ((from >> 1) + 1)) }, { 20001, 9999, 19998 }, { 20001, 10000, 20001 },
+                                 { 20001, 15000, 20001 }, { 20001, -15000, from } };
+    EACH(n, cases) {
+        TEST_ASSERT_EQUAL_INT16_MESSAGE(cases[n][2], held_weakened_for(&params, cases[n][0], cases[n][1]), golden_row(n));
+    }
 }
 
 void test_a_back_emf_that_is_lost_at_once_turns_the_frame_back_by_its_lag_and_the_commanded_vector_stays(void)
