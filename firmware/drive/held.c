@@ -48,12 +48,6 @@ static int16_t held_sum(int16_t sign, dq_t emf)
     return (int16_t)(emf.q - sign * emf.d);
 }
 
-/** How fast the estimator would turn. */
-static speed_erpm_t held_speed(const drive_run_t *run, dq_t emf)
-{
-    return held_omega(run, held_sum(run->estimator.sign, emf));
-}
-
 speed_erpm_t held_weakened_for(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t speed)
 {
     const speed_erpm_t from = p->fieldweak.on_speed_erpm;
@@ -74,7 +68,7 @@ static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uin
 /** What a rotor has turned by in so many steps that is as fast as the back-EMF said when it was asked. */
 static NOINLINE int16_t held_as_asked(const drive_run_t *run, const drive_params_t *p, uint16_t steps)
 {
-    return held_turned(p, held_speed(run, run->held.emf_q12), steps);
+    return held_turned(p, held_omega(run, held_sum(run->estimator.sign, run->held.emf_q12)), steps);
 }
 
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12)
@@ -144,16 +138,15 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     d->run.estimator.omega_filtered_q16 = 0;
 }
 
-/** The estimator goes on. @param stood 1: the rotor stood, and turns now; 0: it has turned all the time, as fast as when it was asked, and by what the
- *  back-EMF gained since */
+/** The estimator goes on. @param stood 1: it stood, and turns now; 0: it has turned all the time, as fast as when it was asked and by what E gained since */
 static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t stood)
 {
     drive_run_t *run = &d->run;
     held_t *shaft = &run->held;
+    const int16_t sign = along_direction(d, 1);
+    const speed_erpm_t omega_erpm = held_omega(run, held_sum(sign, emf));
     int32_t load_q16 = run->observer.load_q16;
-    speed_erpm_t omega_erpm;
-    run->estimator.sign = along_direction(d, 1); /* while the angle stood it had none */
-    omega_erpm = held_speed(run, emf);
+    run->estimator.sign = sign; /* while the angle stood it had none */
     run->estimator.omega_filtered_q16 = (int32_t)omega_erpm * 65536;
     if (stood) {
         load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : load_q16;
@@ -181,8 +174,8 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps); /* since what it is compared with */
     const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
-    const int16_t before = (int16_t)((shaft->emf_q12.d < 0) ? shaft->emf_q12.d : 0);
-    const int16_t turned = qm_sub_limited(before, emf.d); /* -E sin: negative to either side, with E's sign that of the speed; what falls to 0 is a tail */
+    const int16_t before = (int16_t)((shaft->emf_q12.d < 0) ? shaft->emf_q12.d : 0); /* what falls to 0 is the filter's tail */
+    const int16_t turned = qm_sub_limited(before, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
     const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least)
                                       && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
 
@@ -280,10 +273,8 @@ static uint16_t held_turns_on(const held_t *shaft, dq_t emf, uint16_t moved, uin
 {
     const dq_t none = { 0, 0 };
     const uint16_t size = held_moved(emf, none), before = held_moved(shaft->emf_q12, none);
-    if (shaft->steps <= shaft->patience) {
-        return (uint16_t)(shaft->steps > HELD_PATIENCE_STEPS && size > before + least_q12);
-    }
-    return (uint16_t)(size + (moved >> 1) >= before);
+    const uint16_t grows = (uint16_t)(size > before + least_q12), shrinks = (uint16_t)(size + (moved >> 1) < before);
+    return (uint16_t)((shaft->steps > shaft->patience) ? !shrinks : (grows && shaft->steps > HELD_PATIENCE_STEPS));
 }
 
 /** The angle stands. */
