@@ -67,12 +67,12 @@ uint16_t clock_init(void)
     return clock_switch(BOARD_NOSC_PRIPLL, BOARD_OSCCON_LOCK);
 }
 
-INLINE void pins_unlock(void)
+void pins_unlock(void)
 {
     clock_write_low((uint16_t)(OSCCON & ~0x0040u));
 }
 
-INLINE void pins_lock(void)
+void pins_lock(void)
 {
     clock_write_low((uint16_t)(OSCCON | 0x0040u));
 }

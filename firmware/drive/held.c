@@ -165,6 +165,13 @@ static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t s
     shaft->emf_q12 = emf;
 }
 
+/** Has it turned all the time, or was it let go? At once, and against the direction, it was R i. @param turns it turned by what it said */
+static uint16_t held_has_turned(const drive_t *d, uint16_t turns)
+{
+    const held_t *shaft = &d->run.held;
+    return (uint16_t)(turns || (shaft->steps < HELD_ASK_STEPS && along_direction(d, shaft->emf_q12.q) >= 0));
+}
+
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
  *  that changes then was let go, or is so slow that its turn by itself is known. */
 static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
@@ -175,13 +182,12 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
     const int16_t before = (int16_t)((shaft->emf_q12.d < 0) ? shaft->emf_q12.d : 0); /* what falls to 0 is the filter's tail */
-    const int16_t turned = qm_sub_limited(before, emf.d); /* -E sin: negative to either side, with E's sign that of the speed */
+    const int16_t turned = qm_sub_limited(before, emf.d);                            /* -E sin: negative to either side, with E's sign that of the speed */
     const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least)
                                       && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
 
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
-        const uint16_t has_turned = (uint16_t)((turns && tells) || (shaft->steps < HELD_ASK_STEPS && along_direction(d, shaft->emf_q12.q) >= 0));
-        shaft->act = (uint16_t)(has_turned ? HELD_HAS_TURNED : HELD_GOES_ON);
+        shaft->act = (uint16_t)(held_has_turned(d, (uint16_t)(turns && tells)) ? HELD_HAS_TURNED : HELD_GOES_ON);
     } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && steps >= HELD_ASK_STEPS)) {
         shaft->act = (uint16_t)HELD_LEARN;
     } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */

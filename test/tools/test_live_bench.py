@@ -23,7 +23,7 @@ ENDS = {"open_a": "OPEN_PHASE", "open_b": "OPEN_PHASE", "open_c": "OPEN_PHASE", 
         "bus_rail": "OVERVOLTAGE", "supply_lost": "UNDERVOLTAGE", "blocked": "STALL", "interrupts_some": "INTERRUPT_RATE", "interrupts_all": "ADC_LOST"}
 """What the drive says within a second at this speed and load; the others it rides through."""
 TURN_PERIODS = 1000
-FAULT_DEG = 15.0
+FAULT_DEG = 30.0
 """Where the rotor stands when a fault is thrown in. A dead current signal has its own code within 45 degrees of it; from 120 on it looks
 like an open phase."""
 
