@@ -305,6 +305,8 @@ BAD_BOARDS = {
     "bus beyond the converter": ("bus_divider = { value = 16", "bus_divider = { value = 10", "do not rise in this order"),
     "slow amplifier": ("settle = { value = 1.0", "settle = { value = 2.0", "settle = 2 us is longer than the low sides conduct before the sample",
                        "sample_window + 1.5 us - dead_time = 1.1 us", "raise sample_window of [pwm] to 2.5 us"),
+    "amplifier slower than any window": ("settle = { value = 1.0", "settle = { value = 4.0", "settle = 4 us is longer than the low sides conduct before the sample",
+                                         "no sample_window up to 4 us is enough: a faster amplifier or a shorter dead_time"),
     "derived key": ("", "[plant]\n\"shunt.gain_v_per_a\" = 1", "'shunt.gain_v_per_a' stands in another table"),
     "motor's key": ("", "[plant]\n\"motor.rs_ohm\" = 1", "'motor.rs_ohm' is no key of a board"),
 }

@@ -73,6 +73,8 @@ def test_winding_and_magnets_change_no_faster_than_copper_warms(benches):
         now = scenario.plant.values
         for event in scenario.events:
             for key in {"motor.rs_ohm", "motor.psi_vs"} & set(event.keys):
+                own, low, high = {"motor.rs_ohm": (2.67, 0.7, 1.4), "motor.psi_vs": (7.983e-3, 0.8, 1.2)}[key]
+                assert low - 1e-3 <= event.keys[key] / own <= high + 1e-3, (number, event) # 7.983 is rounded
                 ratio = abs(np.log(event.keys[key] / now[key]))
                 assert ratio <= 0.05 * event.over_s + 1e-9, (number, event)
                 seen.append(ratio)

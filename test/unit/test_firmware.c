@@ -205,23 +205,25 @@ void test_drive_is_initialised_before_the_control_interrupt_can_come_and_keeps_a
     }
 }
 
-void test_fault_that_was_kept_over_a_watchdog_reset_is_there_at_the_start(void)
+/** A STALL, and a reset by the watchdog. */
+static void reset_after_a_stall(void)
 {
     start(0);
     board_drive.fault = (uint16_t)FAULT_STALL;
     healthy_ms(1);
     RCON = 0x0010u;
     start_with(lock);
+}
+
+void test_fault_that_was_kept_over_a_watchdog_reset_is_there_at_the_start(void)
+{
+    reset_after_a_stall();
     expect_fault(FAULT_STALL);
 }
 
 void test_the_fault_that_a_watchdog_reset_kept_is_that_of_the_record(void)
 {
-    start(0);
-    board_drive.fault = (uint16_t)FAULT_STALL;
-    healthy_ms(1);
-    RCON = 0x0010u;
-    start_with(lock);
+    reset_after_a_stall();
     TEST_ASSERT_EQUAL_UINT16(FAULT_STALL, board_recorder.fault);
     TEST_ASSERT_EQUAL_UINT16(0, board_recorder.left); /* complete */
 }

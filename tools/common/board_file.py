@@ -22,6 +22,8 @@ _TIME = {"s": Conversion(1.0), "ms": Conversion(1e-3), "us": Conversion(1e-6), "
 _FREQUENCY = {"kHz": Conversion(1e-3, reciprocal=True), "Hz": Conversion(1.0, reciprocal=True)}
 _AMPERE = {"A": Conversion(1.0), "mA": Conversion(1e-3)}
 _ONE = {"1": Conversion(1.0)}
+WINDOW_MOST_S = 4e-6
+"""The longest sample_window that is allowed: at the highest duty, twice this is without voltage."""
 
 TABLES: dict[str, dict[str, Key]] = {
     "supply": {"voltage": Key("nominal bus", Kind("V", 8.0, 60.0, _VOLT), plant="supply.voltage_v"),
@@ -45,7 +47,7 @@ TABLES: dict[str, dict[str, Key]] = {
             "noise": Key("standard deviation of a conversion", Kind("LSB", 0.0, 10.0, {"LSB": Conversion(1.0)}), plant="adc.noise_lsb")},
     "pwm": {"period": Key("PWM and control period", Kind("s", 25e-6, 140e-6, _TIME | _FREQUENCY)),
             "dead_time": Key("between the transistors of a leg", Kind("s", 0.5e-6, 3e-6, _TIME)),
-            "sample_window": Key("low sides on at the highest duty, on each side of the middle of their on time", Kind("s", 1.5e-6, 4e-6, _TIME))},
+            "sample_window": Key("low sides on at the highest duty, on each side of the middle of their on time", Kind("s", 1.5e-6, WINDOW_MOST_S, _TIME))},
     "limits": {"over_voltage": Key("bus above it trips", Kind("V", 6.0, 100.0, _VOLT)),
                "under_voltage": Key("bus below it trips while running", Kind("V", 3.0, 60.0, _VOLT)),
                "regen": Key("braking current falls from here", Kind("V", 6.0, 100.0, _VOLT))}}
@@ -190,8 +192,9 @@ def _check(board: BoardFile) -> None:
 def _check_sample(board: BoardFile, where: dict[str, str]) -> None:
     """The low sides must conduct for the amplifier's time before the sample: docs/law.md#the-sample."""
     delay_s, settle_s = SAMPLE_CLOCK_S * number("SAMPLE_DELAY_CLOCKS"), board.quantities["shunt.settle"].value_si
-    conducts_s = board.sample_window_s + delay_s - board.dead_time_s
+    conducts_s, need_s = board.sample_window_s + delay_s - board.dead_time_s, settle_s - delay_s + board.dead_time_s
     if settle_s > conducts_s + 1e-10:
         raise UserError(f"settle = {settle_s * 1e6:g} us is longer than the low sides conduct before the sample at the highest duty, sample_window + "
                         f"{delay_s * 1e6:g} us - dead_time = {conducts_s * 1e6:.3g} us", where["shunt.settle"],
-                        f"raise sample_window of [pwm] to {(settle_s - delay_s + board.dead_time_s) * 1e6:.4g} us (docs/law.md#the-sample)")
+                        (f"raise sample_window of [pwm] to {need_s * 1e6:.4g} us" if need_s <= WINDOW_MOST_S + 1e-10 else
+                         f"no sample_window up to {WINDOW_MOST_S * 1e6:g} us is enough: a faster amplifier or a shorter dead_time") + " (docs/law.md#the-sample)")
