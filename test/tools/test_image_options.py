@@ -19,7 +19,7 @@ def overfull(folder, used: int | None, flags: str = "", **environment: str) -> s
     (folder / "chip.gld").write_text(SCRIPT, encoding="utf-8")
     (folder / "options").write_text(flags, encoding="utf-8")
     (folder / "report").write_text("" if used is None else REPORT.format(used), encoding="utf-8")
-    (folder / "ld").write_text(f'#!/bin/sh\nwhile [ "$1" != -T ]; do shift; done\ngrep -q "LENGTH = 0xFC00" "$2" && cat {folder}/report\n', encoding="utf-8")
+    (folder / "ld").write_text(f'#!/bin/sh\nwhile [ "$1" != -T ]; do shift; done\ngrep -q "LENGTH = 0xFC00" "$2" && cat "{folder}/report"\n', encoding="utf-8")
     (folder / "ld").chmod(0o755)
     return subprocess.run(["tools/make/overfull.sh", folder / "chip.gld", folder / "wide", folder / "options", folder / "ld", "-mcpu=33FJ32MC204", "image.o"], cwd=paths.ROOT,
                           env=os.environ | environment, capture_output=True, text=True, check=False)

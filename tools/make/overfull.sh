@@ -34,7 +34,7 @@ if [ "${MEASURE:-}" ]; then
 fi
 [ "$used" -gt "$room" ] || exit 1
 # A row of two options is the second one's, on top of the first.
-costs=$(sed -n 's/^| `\([A-Z_]*\)`[ 0-9.]* | +\([0-9]*\) | .*/\1 \2/p; s/^| `\([A-Z_]*\)`, `\([A-Z_]*\)`[ 0-9.]* | +\([0-9]*\) | .*/\2 \3 \1/p' docs/results.md |
+costs=$(sed -n 's/^| `\([A-Z_]*\)`[ 0-9.]*\( (of [0-9-]*)\)\{0,1\} | +\([0-9]*\) | .*/\1 \3/p; s/^| `\([A-Z_]*\)`, `\([A-Z_]*\)`[ 0-9.]*\( (of [0-9-]*)\)\{0,1\} | +\([0-9]*\) | .*/\2 \4 \1/p' docs/results.md |
     awk 'NF == 3 { $2 -= cost[$3] } { cost[$1] = $2; print $1, $2 }' | while read -r name cost; do
     grep -qE -- "-D$name(=[1-9][0-9.]*)?( |$)|^ *# *define +$name +[1-9]" "$flags" && printf '%s' "${comma:-}$name $cost" && comma=', '
 done)
