@@ -36,13 +36,6 @@ static uint16_t held_moved(dq_t emf, dq_t from)
     return (uint16_t)(qm_abs(qm_sub_limited(emf.d, from.d)) + qm_abs(qm_sub_limited(emf.q, from.q)));
 }
 
-/** The size of a back-EMF, as held_moved(). */
-static uint16_t held_size(dq_t emf)
-{
-    const dq_t none = { 0, 0 };
-    return held_moved(emf, none);
-}
-
 /** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
 static NOINLINE speed_erpm_t held_omega(const drive_run_t *run, int16_t sum_q12)
 {
@@ -103,9 +96,10 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
 {
     const drive_run_t *run = &d->run;
     const speed_erpm_t along = along_direction(d, observer_speed(&run->observer)), least = protection_least_speed(run, p);
+    const dq_t none = { 0, 0 };
     if (run->held.stood) {
         const uint16_t off = (uint16_t)((run->held.steps < HELD_SLOW_STEPS) ? 0 : model_header_ri(p, qm_abs(run->control.i_q13.q)) >> HELD_R_SHIFT);
-        return (uint16_t)((held_size(emf) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
+        return (uint16_t)((held_moved(emf, none) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
     }
     if (along >= least || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d)
         || !protection_rotor_is_doubtful(run, p)) {
@@ -144,36 +138,23 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     d->run.estimator.omega_filtered_q16 = 0;
 }
 
-/** The frame turns to where a back-EMF says that the rotor is: by its direction, and by what the filter is behind. */
-static void held_turn_to(drive_t *d, const drive_params_t *p, dq_t *emf, int16_t sign)
-{
-    const angle_t ahead = trig_direction((int16_t)(sign * emf->q), (int16_t)(-sign * emf->d));
-    const alphabeta_t e = { emf->d, emf->q };
-    *emf = park(e, trig_sincos(ahead));
-    held_turn_back(d, p, (int16_t) - (int16_t)(uint16_t)(ahead + (uint16_t)(held_lead(&d->run, p, emf->q))));
-    emf->d = 0;
-    d->run.estimator.e_d_q28 = 0;
-    d->run.estimator.e_q_q28 = (int32_t)emf->q * 65536;
-}
-
 /** The estimator goes on. @param stood 1: it stood, and turns now; 0: it has turned all the time, as fast as when it was asked and by what E gained since */
 static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t stood)
 {
     drive_run_t *run = &d->run;
     held_t *shaft = &run->held;
     const int16_t sign = along_direction(d, 1);
-    speed_erpm_t omega_erpm;
+    const speed_erpm_t omega_erpm = held_omega(run, held_sum(sign, emf));
     int32_t load_q16 = run->observer.load_q16;
+    run->estimator.sign = sign; /* while the angle stood it had none */
+    run->estimator.omega_filtered_q16 = (int32_t)omega_erpm * 65536;
     if (stood) {
         load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : load_q16;
         shaft->stood = 2;
-        held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
     } else {
-        held_turn_to(d, p, &emf, sign);
+        shaft->turned_q12 = qm_within(shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience)), -32767, 32767);
     }
-    omega_erpm = held_omega(run, held_sum(sign, emf));
-    run->estimator.sign = sign; /* while the angle stood it had none */
-    run->estimator.omega_filtered_q16 = (int32_t)omega_erpm * 65536;
+    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
     held_enter(shaft, HELD_TURNS);
     drive_update_model(run, p, run->control.reference_erpm, omega_erpm);
     observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, omega_erpm, 0);
@@ -191,19 +172,6 @@ static uint16_t held_has_turned(const drive_t *d, uint16_t turns)
     return (uint16_t)(turns || (shaft->steps < HELD_ASK_STEPS && along_direction(d, shaft->emf_q12.q) >= 0));
 }
 
-/** Does a back-EMF shrink more than it turns? That of a rotor which comes to its stop. */
-static uint16_t held_shrinks(const held_t *shaft, dq_t emf, uint16_t moved)
-{
-    return (uint16_t)(held_size(emf) + (moved >> 1) < held_size(shaft->emf_q12));
-}
-
-/** Has it more of a d part than R i can have, that of a rotor which is ahead by more than 45 degrees? */
-static uint16_t held_is_ahead(const drive_t *d, dq_t emf, uint16_t moved, int16_t least_q12)
-{
-    const held_t *shaft = &d->run.held;
-    return (uint16_t)(shaft->stood == 0u && -emf.d > along_direction(d, emf.q) && -emf.d > least_q12 && !held_shrinks(shaft, emf, moved));
-}
-
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
  *  that changes then was let go, or is so slow that its turn by itself is known. */
 static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
@@ -218,11 +186,9 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least)
                                       && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
 
-    if (held_is_ahead(d, emf, moved, (int16_t)most)) {
-        shaft->act = (uint16_t)HELD_HAS_TURNED;
-    } else if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
+    if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
         shaft->act = (uint16_t)(held_has_turned(d, (uint16_t)(turns && tells)) ? HELD_HAS_TURNED : HELD_GOES_ON);
-    } else if (shaft->steps >= HELD_ASK_MOST_STEPS || ((tells || along_direction(d, shaft->emf_q12.q) < 0) && steps >= HELD_ASK_STEPS)) {
+    } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && steps >= HELD_ASK_STEPS)) {
         shaft->act = (uint16_t)HELD_LEARN;
     } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */
         shaft->emf_q12 = emf;
@@ -307,16 +273,14 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
     observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
 }
 
-/** Has it turned all the time? A back-EMF that does not come to stand says so; but for that of a rotor which comes to its stop. One that grows says so
- *  at once. */
+/** Has it turned all the time? A back-EMF that does not come to stand says so; but for one that goes more towards zero than round, that of a rotor which
+ *  comes to its stop. One that grows says so at once. */
 static uint16_t held_turns_on(const held_t *shaft, dq_t emf, uint16_t moved, uint16_t least_q12)
 {
-    const uint16_t size = held_size(emf);
-    if (size <= 2u * least_q12 || moved <= least_q12 >> 1) {
-        return 0;
-    }
-    return (uint16_t)((shaft->steps > shaft->patience) ? !held_shrinks(shaft, emf, moved)
-                                                       : (size > held_size(shaft->emf_q12) + least_q12 && shaft->steps > HELD_PATIENCE_STEPS));
+    const dq_t none = { 0, 0 };
+    const uint16_t size = held_moved(emf, none), before = held_moved(shaft->emf_q12, none);
+    const uint16_t grows = (uint16_t)(size > before + least_q12), shrinks = (uint16_t)(size + (moved >> 1) < before);
+    return (uint16_t)((shaft->steps > shaft->patience) ? !shrinks : (grows && shaft->steps > HELD_PATIENCE_STEPS));
 }
 
 /** The angle stands. */
@@ -328,13 +292,14 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->turned_q12 = qm_sub_limited(shaft->turned_q12, qm_sub_limited(base_q12, emf.q));
     switch (shaft->phase) {
     case HELD_SETTLES:
-        if (held_turns_on(shaft, emf, moved, most) || (shaft->steps > HELD_SETTLE_STEPS && held_is_ahead(d, emf, moved, (int16_t)most))) {
-            shaft->act = (uint16_t)HELD_HAS_TURNED;
-        } else if (moved <= most >> 1 && shaft->steps >= HELD_SETTLE_STEPS) {
+        if (moved <= most >> 1 && shaft->steps >= HELD_SETTLE_STEPS) {
             shaft->patience = shaft->steps;
             shaft->turned_q12 = 0;
             held_enter(shaft, HELD_ASKED);
-        } else { /* the current changes */
+        } else if (held_turns_on(shaft, emf, moved, most)) {
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
+            emf.q = 0; /* all of it is in the sum */
+        } else {       /* the current changes */
         }
         shaft->emf_q12 = emf;
         break;
