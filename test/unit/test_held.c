@@ -642,6 +642,21 @@ void test_a_back_emf_that_turns_backwards_is_no_rotor_that_turns_forwards(void)
     }
 }
 
+void test_a_back_emf_that_changes_before_the_fourth_step_of_a_question_had_turned_all_the_time_and_then_it_was_let_go(void)
+{
+    EACH_DIRECTION(direction) {
+        for (uint16_t step = HELD_ASK_STEPS - 1u; step <= HELD_ASK_STEPS; step++) {
+            asked(direction, 20);
+            steps(HELD_SETTLE_STEPS + step - 1u);
+            TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+            rig_emf(0, (int16_t)(direction * (20 + 3 * params.adaptation.emf_least_q12)));
+            steps(1);
+            TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+            TEST_ASSERT_EQUAL_UINT16((step < HELD_ASK_STEPS) ? 0 : 2, shaft->stood);
+        }
+    }
+}
+
 void test_a_back_emf_that_changes_late_in_a_long_question_turns_the_frame_by_what_it_gained_alone(void)
 {
     const int16_t gains_q12 = (int16_t)(3 * params.adaptation.emf_least_q12);
