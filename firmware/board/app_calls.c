@@ -263,8 +263,7 @@ void app_pulse_look(uint16_t ticks)
     }
     if (IC2CONbits.ICBNE) {
         const uint16_t length_200ns = (uint16_t)(IC2BUF - pulse.begin_200ns);
-        if (pulse.has_begun && pulse.length_200ns == 0u && length_200ns < PULSE_MOST
-            && (uint16_t)(ticks - pulse.begin_ticks) <= PULSE_ONCE_ROUND_TICKS) {
+        if (pulse.has_begun && pulse.length_200ns == 0u && length_200ns < PULSE_MOST && (uint16_t)(ticks - pulse.begin_ticks) <= PULSE_ONCE_ROUND_TICKS) {
             pulse.length_200ns = length_200ns;
         }
     }

@@ -127,9 +127,8 @@ static void test_outputs(void)
     if (now == BOARD_OUTPUTS_OFF || (state == (uint16_t)DRIVE_ALIGN && board_drive.periods <= DEFER_ALIGN_PERIODS && now == BOARD_OUTPUTS_BOOTSTRAP)) {
         return;
     }
-    if (board_drive.fault != (uint16_t)FAULT_NONE
-        || now != (drive_is_running(&board_drive) ? BOARD_OUTPUTS_PWM : low ? BOARD_OUTPUTS_BOOTSTRAP
-                                                                            : BOARD_OUTPUTS_OFF)) {
+    if (board_drive.fault != (uint16_t)FAULT_NONE || now != (drive_is_running(&board_drive) ? BOARD_OUTPUTS_PWM : low ? BOARD_OUTPUTS_BOOTSTRAP
+                                                                                                                      : BOARD_OUTPUTS_OFF)) {
         selftest_fail(SELFTEST_REGISTERS);
     }
 }

@@ -169,8 +169,7 @@ QM_WRAPS void catch_preset_estimator(drive_t *d, const drive_params_t *p)
     int16_t ahead = qm_with_sign(0x4000, e->omega_erpm);
     uint16_t emf, most;
     int32_t half_step_q32 = qm_mulss(e->omega_erpm, p->estimator.deltat_q32) / 2;
-    e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16)
-                 + (uint32_t)half_step_q32 * (uint32_t)(uint16_t)(c->half_periods + 2u * d->periods + 1u);
+    e->rho_q32 = ((uint32_t)(angle_t)(c->direction - (angle_t)ahead) << 16) + (uint32_t)half_step_q32 * (uint32_t)(uint16_t)(c->half_periods + 2u * d->periods + 1u);
     e->next = estimator_ahead(e->rho_q32, 2 * half_step_q32);
     e->half_step_q16_rad = qm_mulhi_su(e->omega_erpm, p->estimator.half_step_q16_rad);
     e->omega_filtered_q16 = (int32_t)e->omega_erpm * 65536;

@@ -30,10 +30,22 @@ uint16_t held_angle_stands(const held_t *shaft)
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
+/** a - b, as qm_sub_limited(), in one place. */
+static NOINLINE int16_t held_less(int16_t a, int16_t b)
+{
+    return qm_sub_limited(a, b);
+}
+
 /** How far the back-EMF has moved. */
 static uint16_t held_moved(dq_t emf, dq_t from)
 {
-    return (uint16_t)(qm_abs(qm_sub_limited(emf.d, from.d)) + qm_abs(qm_sub_limited(emf.q, from.q)));
+    return (uint16_t)(qm_abs(held_less(emf.d, from.d)) + qm_abs(held_less(emf.q, from.q)));
+}
+
+/** The size of a back-EMF, as held_moved(). */
+static NOINLINE uint16_t held_size(dq_t emf)
+{
+    return (uint16_t)((uint16_t)qm_abs(emf.d) + (uint16_t)qm_abs(emf.q));
 }
 
 /** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
@@ -90,19 +102,16 @@ static void held_turn_back(drive_t *d, const drive_params_t *p, int16_t lead)
     handover_preset(d, p, e->next);
 }
 
-/** How much a step says for a rotor that stands: it is slower than what counts as a stall, and R i may be all of the back-EMF. Once R is known it is
- *  a rotor without back-EMF. */
-static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf)
+/** How much a step says for a rotor that stands: it is slower than three quarters of its reference, and R i may be all of the back-EMF. Once R is known it is
+ *  a rotor without back-EMF. @param along observed speed @param least what counts as a stall, half of the reference */
+static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf, speed_erpm_t along, speed_erpm_t least)
 {
     const drive_run_t *run = &d->run;
-    const speed_erpm_t along = along_direction(d, observer_speed(&run->observer)), least = protection_least_speed(run, p);
-    const dq_t none = { 0, 0 };
     if (run->held.stood) {
         const uint16_t off = (uint16_t)((run->held.steps < HELD_SLOW_STEPS) ? 0 : model_header_ri(p, qm_abs(run->control.i_q13.q)) >> HELD_R_SHIFT);
-        return (uint16_t)((held_moved(emf, none) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
+        return (uint16_t)((held_size(emf) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
     }
-    if (along >= least || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d)
-        || !protection_rotor_is_doubtful(run, p)) {
+    if (along >= least + (least >> 1) || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d) || !protection_rotor_is_doubtful(run, p)) {
         return 0;
     }
     if (along < (least >> 2)) {
@@ -123,14 +132,12 @@ QM_WRAPS static int16_t held_clear_of_zero(const drive_t *d, int16_t lead)
 static void held_stop_angle(drive_t *d, const drive_params_t *p)
 {
     held_t *shaft = &d->run.held;
-    uint16_t turns_far;
+    const uint16_t d_current_goes = qm_beyond(d->run.control.ref_q13.d, (int16_t)(p->current_max_q13 >> HELD_FAR_SHIFT));
     int16_t lead;
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
-    turns_far = (uint16_t)(qm_beyond(lead, HELD_FAR_LEAD) || qm_beyond(d->run.control.ref_q13.d, (int16_t)(p->current_max_q13 >> HELD_FAR_SHIFT)));
-    shaft->patience = turns_far ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS;
-    shaft->turned_q12 = 0;
+    shaft->patience = (uint16_t)((d_current_goes || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS);
     held_turn_back(d, p, held_clear_of_zero(d, lead));
     held_enter(shaft, HELD_SETTLES);
     d->run.model.inv_kfi = 0;
@@ -138,38 +145,64 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     d->run.estimator.omega_filtered_q16 = 0;
 }
 
-/** The estimator goes on. @param stood 1: it stood, and turns now; 0: it has turned all the time, as fast as when it was asked and by what E gained since */
+/** A back-EMF's part along an axis that is so far ahead of the q axis: all of its length, where it points there. */
+static int16_t held_along(dq_t emf, angle_t ahead)
+{
+    const alphabeta_t standing = { emf.d, emf.q };
+    return (int16_t)(2 * park(standing, trig_sincos(ahead)).q);
+}
+
+/** The frame turns to where a back-EMF says that the rotor is: by its direction, and by what the filter is behind. @return its length, with its sign */
+static int16_t held_turn_to(drive_t *d, const drive_params_t *p, dq_t emf, int16_t sign)
+{
+    const angle_t ahead = trig_direction((int16_t)(sign * emf.q), (int16_t)(-sign * emf.d));
+    const int16_t length = held_along(emf, ahead);
+    held_turn_back(d, p, (int16_t)(uint16_t) ~(uint16_t)(ahead + (uint16_t)held_lead(&d->run, p, length))); /* to a count */
+    d->run.estimator.e_d_q28 = 0;
+    d->run.estimator.e_q_q28 = (int32_t)length * 65536;
+    return length;
+}
+
+/** The estimator goes on. @param stood 1: it stood, and turns now; 0: it has turned all the time */
 static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t stood)
 {
     drive_run_t *run = &d->run;
     held_t *shaft = &run->held;
     const int16_t sign = along_direction(d, 1);
-    const speed_erpm_t omega_erpm = held_omega(run, held_sum(sign, emf));
-    int32_t load_q16 = run->observer.load_q16;
+    speed_erpm_t omega_erpm;
+    if (stood) {
+        run->observer.load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : run->observer.load_q16;
+        shaft->stood = 2;
+        held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
+    } else {
+        emf.q = held_turn_to(d, p, emf, sign);
+        emf.d = 0;
+    }
+    omega_erpm = held_omega(run, held_sum(sign, emf));
     run->estimator.sign = sign; /* while the angle stood it had none */
     run->estimator.omega_filtered_q16 = (int32_t)omega_erpm * 65536;
-    if (stood) {
-        load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : load_q16;
-        shaft->stood = 2;
-    } else {
-        shaft->turned_q12 = qm_within(shaft->turned_q12 + qm_mulsu(shaft->emf_q12.q, (uint16_t)(shaft->steps + shaft->patience)), -32767, 32767);
-    }
-    held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
+    run->model.inv_kfi = shaft->inv_kfi;
     held_enter(shaft, HELD_TURNS);
-    drive_update_model(run, p, run->control.reference_erpm, omega_erpm);
-    observer_preset(&run->observer, &p->observer, run->estimator.rho_q32, omega_erpm, 0);
-    run->observer.load_q16 = load_q16;
+    run->observer.rho_q32 = run->estimator.rho_q32;
+    run->observer.omega_q16 = run->estimator.omega_filtered_q16;
     run->observer.fast_share_q15 = 32767;
     run->observer.gate_level = 0;
     shaft->lag_q12 = 0;
+    shaft->doubted_steps = 0;
     shaft->emf_q12 = emf;
 }
 
-/** Has it turned all the time, or was it let go? At once, and against the direction, it was R i. @param turns it turned by what it said */
+/** 1 where the rotor has turned all the time: its back-EMF turned by what it said, or changed at once. 0: it was let go. @param turns it turned by what it said */
 static uint16_t held_has_turned(const drive_t *d, uint16_t turns)
 {
+    return (uint16_t)(turns || (d->run.held.steps < HELD_ASK_STEPS && along_direction(d, d->run.held.emf_q12.q) >= 0));
+}
+
+/** Has it more of a d part than R i can have, that of a rotor which is ahead by more than 45 degrees? One that comes to its stop has less of it than before. */
+static uint16_t held_is_ahead(const drive_t *d, dq_t emf, int16_t least_q12)
+{
     const held_t *shaft = &d->run.held;
-    return (uint16_t)(turns || (shaft->steps < HELD_ASK_STEPS && along_direction(d, shaft->emf_q12.q) >= 0));
+    return (uint16_t)(shaft->stood == 0u && shaft->steps > HELD_SETTLE_STEPS && emf.d <= shaft->emf_q12.d && -emf.d > along_direction(d, emf.q) && -emf.d > least_q12);
 }
 
 /** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
@@ -181,14 +214,12 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps); /* since what it is compared with */
     const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
-    const int16_t before = (int16_t)((shaft->emf_q12.d < 0) ? shaft->emf_q12.d : 0); /* what falls to 0 is the filter's tail */
-    const int16_t turned = qm_sub_limited(before, emf.d);                            /* -E sin: negative to either side, with E's sign that of the speed */
-    const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least)
-                                      && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
-
+    const int16_t before = qm_clamp(shaft->emf_q12.d, INT16_MIN, 0); /* what falls to 0 is the filter's tail */
+    const int16_t turned = held_less(before, emf.d);                 /* -E sin: negative to either side, with E's sign that of the speed */
+    const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least) && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
         shaft->act = (uint16_t)(held_has_turned(d, (uint16_t)(turns && tells)) ? HELD_HAS_TURNED : HELD_GOES_ON);
-    } else if (shaft->steps >= HELD_ASK_MOST_STEPS || (tells && steps >= HELD_ASK_STEPS)) {
+    } else if (shaft->steps >= HELD_ASK_MOST_STEPS || ((tells || along_direction(d, shaft->emf_q12.q) < 0) && steps >= HELD_ASK_STEPS)) {
         shaft->act = (uint16_t)HELD_LEARN;
     } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */
         shaft->emf_q12 = emf;
@@ -209,7 +240,7 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
         share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
         if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
-            shaft->run_on = held_as_asked(run, p, (uint16_t)(shaft->doubted_steps + 1u));
+            shaft->run_on = held_as_asked(run, p, shaft->doubted_steps);
             shaft->act = (uint16_t)HELD_TURN_BACK;
         }
         run->adaptation.rs_q31 = (int32_t)qm_within((int32_t)qm_hi(run->adaptation.rs_q31) + share, p->adaptation.rs_least, p->adaptation.rs_most) * 65536;
@@ -236,19 +267,19 @@ static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
-    uint16_t doubts = held_doubts(d, p, emf);
+    const speed_erpm_t along = along_direction(d, observer_speed(&d->run.observer)), least = protection_least_speed(&d->run, p);
+    uint16_t doubts = held_doubts(d, p, emf, along, least);
     held_follow_lag(shaft, &d->run, emf);
+    shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
     if (shaft->phase != (uint16_t)HELD_NOT) { /* until it is back at its speed, or may be asked again */
-        if (along_direction(d, observer_speed(&d->run.observer)) >= protection_least_speed(&d->run, p)
-            || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS)) {
+        if (along >= least || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS)) {
             held_enter(shaft, HELD_NOT);
             shaft->stood = 0;
         }
         doubts = (uint16_t)((shaft->stood != 0u) ? doubts : 0u); /* it stood, and speeds up */
     }
-    shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
-    if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
+    if (shaft->doubts >= ((along < least) ? HELD_DOUBTS_MOST : HELD_DOUBTS_DIP) && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
         shaft->act = (uint16_t)HELD_STOP;
     }
 }
@@ -273,14 +304,10 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
     observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
 }
 
-/** Has it turned all the time? A back-EMF that does not come to stand says so; but for one that goes more towards zero than round, that of a rotor which
- *  comes to its stop. One that grows says so at once. */
-static uint16_t held_turns_on(const held_t *shaft, dq_t emf, uint16_t moved, uint16_t least_q12)
+/** Has it turned all the time? A back-EMF that does not come to stand says so. One that grows says so at once. @param size its size, and before */
+static uint16_t held_turns_on(const held_t *shaft, uint16_t size, uint16_t before, uint16_t least_q12)
 {
-    const dq_t none = { 0, 0 };
-    const uint16_t size = held_moved(emf, none), before = held_moved(shaft->emf_q12, none);
-    const uint16_t grows = (uint16_t)(size > before + least_q12), shrinks = (uint16_t)(size + (moved >> 1) < before);
-    return (uint16_t)((shaft->steps > shaft->patience) ? !shrinks : (grows && shaft->steps > HELD_PATIENCE_STEPS));
+    return (uint16_t)(size > 2u * least_q12 && (shaft->steps > shaft->patience || (size > before + least_q12 && shaft->steps > HELD_PATIENCE_STEPS)));
 }
 
 /** The angle stands. */
@@ -288,18 +315,23 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
-    const int16_t base_q12 = (int16_t)((shaft->phase == (uint16_t)HELD_SETTLES) ? 0 : shaft->emf_q12.q);
-    shaft->turned_q12 = qm_sub_limited(shaft->turned_q12, qm_sub_limited(base_q12, emf.q));
+    const uint16_t size = held_size(emf), before = held_size(shaft->emf_q12);
+    const uint16_t shrinks = (uint16_t)(size + (moved >> 1) < before); /* more than it turns: that of a rotor which comes to its stop */
+    shaft->turned_q12 = held_less(shaft->turned_q12, held_less(shaft->emf_q12.q, emf.q));
+    if (held_is_ahead(d, emf, (int16_t)most)) {
+        shaft->act = (uint16_t)HELD_HAS_TURNED;
+        return;
+    }
     switch (shaft->phase) {
     case HELD_SETTLES:
-        if (moved <= most >> 1 && shaft->steps >= HELD_SETTLE_STEPS) {
-            shaft->patience = shaft->steps;
+        if (moved > most >> 1 || shaft->steps < HELD_SETTLE_STEPS) { /* the current changes, or it turns */
+            if (!shrinks && held_turns_on(shaft, size, before, most)) {
+                shaft->act = (uint16_t)HELD_HAS_TURNED;
+            }
+        } else {
             shaft->turned_q12 = 0;
+            shaft->doubted_steps = (uint16_t)((shaft->steps > HELD_PATIENCE_STEPS) ? 0u : shaft->doubted_steps + 1u); /* it stood, or came to its stop since */
             held_enter(shaft, HELD_ASKED);
-        } else if (held_turns_on(shaft, emf, moved, most)) {
-            shaft->act = (uint16_t)HELD_HAS_TURNED;
-            emf.q = 0; /* all of it is in the sum */
-        } else {       /* the current changes */
         }
         shaft->emf_q12 = emf;
         break;
@@ -333,7 +365,6 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
     held_t *shaft = &d->run.held;
     const dq_t emf = estimator_emf(&d->run.estimator);
     const uint16_t act = shaft->act;
-
     shaft->act = (uint16_t)HELD_WAITS;
     switch (act) {
     case HELD_STOP: held_stop_angle(d, p); break;

@@ -217,8 +217,7 @@ static uint16_t limits_start_swings(const drive_t *d, const drive_params_t *p)
     if (!mode_hands_over()) {
         return 0;
     }
-    return (uint16_t)(d->state == (uint16_t)DRIVE_RAMP && handover_is_overdue(forced, p) && !handover_agrees(h)
-                      && qm_abs(h->ahead_erpm) < forced >> 3);
+    return (uint16_t)(d->state == (uint16_t)DRIVE_RAMP && handover_is_overdue(forced, p) && !handover_agrees(h) && qm_abs(h->ahead_erpm) < forced >> 3);
 }
 
 uint16_t limits_reasons(const drive_t *d, const drive_params_t *p)

@@ -97,9 +97,8 @@ void drive_update_model(drive_run_t *run, const drive_params_t *p, speed_erpm_t 
     }
 }
 
-/** 1 where the closed loop teaches: it rests until the observer runs, while the speed changes fast, and at the limits of current and voltage. It does
- *  not wait for the hand-over's d current to go: where R, L and Kphi are all wrong, the lock needs it before; what dR i_d puts into Ed passes with
- *  that current. */
+/** 1 where the closed loop teaches: it rests until the observer runs, while the speed changes fast, and at the limits of current and voltage. It does not wait
+ *  for the hand-over's d current to go: where R, L and Kphi are all wrong, the lock needs it before; what dR i_d puts into Ed passes with that current. */
 static uint16_t model_is_taught(const drive_run_t *run)
 {
     const drive_control_t *c = &run->control;

@@ -26,31 +26,25 @@ static void control_speed(drive_t *d, const drive_params_t *p, const drive_sampl
     speed_step(d, p);
 }
 
-/** Where a state leads to the next by what the rotor does: CLOSED does not. */
-static void step_beside_closed(drive_t *d, const drive_params_t *p)
-{
-    if (d->state != (uint16_t)DRIVE_CLOSED) {
-        states_rotor_step(d, p);
-    }
-}
-
-/** Where a state leads to the next by what the rotor does, and what follows for a rotor that may be held. */
+/** Where a state leads to the next by what the rotor does, CLOSED does not, or what follows for a rotor that may be held. */
 static void step_state(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
     if (d->run.held.act != (uint16_t)HELD_WAITS && drive_is_closed(d)) {
         held_act(d, p);
-    } else {
-        step_beside_closed(d, p);
+    } else if (d->state != (uint16_t)DRIVE_CLOSED) {
+        states_rotor_step(d, p);
+    } else { /* nothing waits */
     }
 }
 
-/** As step_state(); in closed loop: may the rotor stand? */
+/** In closed loop: may the rotor stand? Else as step_state(). */
 static void ask_rotor(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
 {
     if (drive_is_closed(d)) {
         held_step(d, p);
+    } else {
+        states_rotor_step(d, p);
     }
-    step_beside_closed(d, p);
 }
 
 /** The modulator's gain follows the bus, and so does what braking may do to it. */

@@ -57,9 +57,8 @@ void speed_schedule(drive_run_t *run, const drive_params_t *p)
     run->control.speed_kp_q13 = observer_between(0, gain, observer_twice(o->share_q15)); /* at low speed a light rotor needs it more than the rates */
 }
 
-/** No integral for the load: its estimate never winds up, for it is made from the current that flows. The trim takes what an estimate leaves
- *  whose innovations are not as large to either side.
- *  @param target_erpm speed to be held @return q current within iq_limit_q13, with 13 fraction bits */
+/** No integral for the load: its estimate never winds up, for it is made from the current that flows. The trim takes what an estimate leaves whose innovations
+ *  are not as large to either side. @param target_erpm speed to be held @return q current within iq_limit_q13, with 13 fraction bits */
 static int32_t speed_current_q26(const drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm)
 {
     const drive_control_t *c = &run->control;

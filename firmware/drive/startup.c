@@ -281,8 +281,7 @@ void handover_observe(drive_run_t *run, const drive_params_t *p)
         return;
     }
     if (run->handover.phase == (uint16_t)START_DONE) {
-        observer_step(&run->observer, &p->observer, mode_observed(run),
-                      (int16_t)(salient_torque(run, c->i_q13.q) - mode_profile_current(run)));
+        observer_step(&run->observer, &p->observer, mode_observed(run), (int16_t)(salient_torque(run, c->i_q13.q) - mode_profile_current(run)));
         /* dead time shakes the estimate most while the d current falls, and where a q current that brakes crosses zero: no load does */
         if (run->handover.offset != 0 || qm_mulss(c->ref_q13.q, observer_speed(&run->observer)) < 0) {
             observer_raise_gate(&run->observer);

@@ -90,8 +90,7 @@ INLINE uint16_t drive_is_closed(const drive_t *d)
 
 uint16_t drive_conducts(const drive_t *d)
 {
-    return (uint16_t)(d->fault == (uint16_t)FAULT_NONE
-                      && (uint16_t)(d->state - (uint16_t)DRIVE_BOOTSTRAP) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_BOOTSTRAP);
+    return (uint16_t)(d->fault == (uint16_t)FAULT_NONE && (uint16_t)(d->state - (uint16_t)DRIVE_BOOTSTRAP) <= (uint16_t)DRIVE_STOPPING - (uint16_t)DRIVE_BOOTSTRAP);
 }
 
 INLINE uint16_t drive_shorts(const drive_t *d)

@@ -10,7 +10,7 @@ uint16_t clock_init(void);
 /** Opens the selection of remappable pins for changes. */
 void pins_unlock(void);
 
-/** Ends that. */
+/** Closes the selection of remappable pins. */
 void pins_lock(void);
 
 /** Pin directions, analogue pins, remappable inputs and outputs. */

@@ -51,9 +51,8 @@ void record_init(drive_fault_t kept);
 /** A pass of the background. */
 void record_tick(void);
 
-/** The next line of a record that is complete and not sent yet: "record fault STALL rows 64 every 4 offsets -12 3", the currents' offsets in Q13;
- *  then for each row, the oldest first, "row 17 -12 3 6 80 -113 101": its place in the ring and its bytes (recorder.h).
- *  @return its end; the line itself without one */
+/** The next line of a record that is complete and not sent yet: "record fault STALL rows 64 every 4 offsets -12 3", the currents' offsets in Q13; then for each
+ *  row, the oldest first, "row 17 -12 3 6 80 -113 101": its place in the ring and its bytes (recorder.h). @return its end; the line itself without one */
 char *record_line(char *line);
 
 #endif

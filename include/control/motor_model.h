@@ -96,9 +96,8 @@ typedef struct {
 /** Entry of a table between two points. @param index 0..FIELDWEAK_ENTRIES - 2 */
 int16_t fieldweak_between(const int16_t *table, uint16_t index, uint16_t fraction_q16);
 
-/** Looks up the three tables for a speed reference (not the estimated speed); with the back-EMF's filter they go to the estimator.
- *  Entries above the last are never read: at and beyond index 17 the last entry holds, to one count.
- *  @param ref_erpm speed reference, any value and sign */
+/** Looks up the three tables for a speed reference (not the estimated speed); with the back-EMF's filter they go to the estimator. Entries above the last are
+ *  never read: at and beyond index 17 the last entry holds, to one count. @param ref_erpm speed reference, any value and sign */
 void fieldweak_tick(fieldweak_t *fw, const fieldweak_params_t *p, motor_model_t *model, speed_erpm_t ref_erpm);
 
 /** Voltage feedback: where the q axis has run into the voltage limit, more d current is asked for, and given back later. It makes up for a

@@ -72,8 +72,7 @@ int32_t observer_sum(int32_t omega_q16, int32_t change);
 /** Begins at a known angle and speed with a known q current, calm. @param speed_erpm at most 32700 */
 void observer_preset(observer_t *o, const observer_params_t *p, uint32_t rho_q32, speed_erpm_t speed_erpm, current_q13_t iq_q13);
 
-/** What counts as a large innovation after so much unrest: up to 16 times as much.
- *  @param calm_erpm 0..32767 @param gate_level some thousand at most */
+/** What counts as a large innovation after so much unrest: up to 16 times as much. @param calm_erpm 0..32767 @param gate_level some thousand at most */
 int16_t observer_gate(int16_t calm_erpm, uint16_t gate_level);
 
 /** As much unrest as at the hand-over, at least. */
@@ -82,10 +81,9 @@ void observer_raise_gate(observer_t *o);
 /** The rate for the next step. @param speed magnitude of the speed reference @param iq_q13 q current asked for, above -32768 */
 void observer_schedule(observer_t *o, const observer_params_t *p, speed_erpm_t speed, current_q13_t iq_q13);
 
-/** By how much the angle has turned further in a step than the speed says, as a speed.
- *  The mean over the step, not a sample: a step of current gives the back-EMF a pulse and, over the derivative's eight samples, its
- *  opposite, which cancel over eight periods. The difference wraps with the angle, so no speed is too high.
- *  @param rho_q32 the estimator's angle @param omega_erpm speed in the middle of the step @return erpm, within innovation_max_erpm */
+/** By how much the angle has turned further in a step than the speed says, as a speed. The mean over the step, not a sample: a step of current gives the
+ *  back-EMF a pulse and, over the derivative's eight samples, its opposite, which cancel over eight periods. The difference wraps with the angle, so no speed
+ *  is too high. @param rho_q32 the estimator's angle @param omega_erpm speed in the middle of the step @return erpm, within innovation_max_erpm */
 int16_t observer_innovation(observer_t *o, const observer_params_t *p, uint32_t rho_q32, speed_erpm_t omega_erpm);
 
 /** By how much the load's estimate falls: innovation * rate^2 in all its bits, for a slow rate's square is below a word's last.

@@ -157,7 +157,6 @@ struct drive {
     int32_t bus_q31;         /**< filtered bus, upper word Q15 of full scale */
     voltage_circle_t circle; /**< voltage circle at this bus */
     uint16_t duty_per_volt_q16;
-
     forced_angle_t forced;     /**< a start clears it, with all that follows (drive_start()) */
     dead_duties_t dead;        /**< dead-time compensation of the next two pulses, or of the first */
     dead_duties_t dead_second; /**< of the second pulse to come, where each has its own */

@@ -2,8 +2,9 @@
  *
  * The estimator cannot see a rotor that stands: R i and a back-EMF look alike. Its angle runs away, and a shaft that is let go is thrown wherever the
  * angle has come to. So where the rotor may stand, the angle stands, too, and the current with it. A back-EMF that stands still is R i alone: it tells R,
- * and how far the angle had run. One that turns or changes is a rotor that turns, and the estimator goes on. The less back-EMF there is, the longer
- * the question takes: dead time must not hide the turn. A rotor that stands for PARAM_STALL_SEC is a stall as ever. */
+ * and how far the angle had run. One that turns or changes is a rotor that turns: where it has turned all the time, its direction in the frame that
+ * stands says where the rotor is, and the estimator goes on from there. The less back-EMF there is, the longer the question takes: dead time must not
+ * hide the turn. A rotor that stands for PARAM_STALL_SEC is a stall as ever. */
 #ifndef DRIVE_HELD_H
 #define DRIVE_HELD_H
 
@@ -35,9 +36,9 @@ typedef struct {
     uint16_t act;            /**< HELD_WAITS .. HELD_GOES_ON: what waits for the rotor's next step */
     uint16_t steps;          /**< in the phase */
     uint16_t doubts;         /**< steps that look like a held rotor; a rotor far below its reference counts three */
-    uint16_t doubted_steps;  /**< since then */
-    int16_t turned_q12;      /**< sum of the back-EMF's q part, a step each, since the angle stands; from HELD_ASKED on of what it gained: flux times the angle turned */
-    uint16_t patience;       /**< steps that the back-EMF has to settle; from HELD_ASKED on those that it took */
+    uint16_t doubted_steps;  /**< since then; from HELD_ASKED on those that R i had turned the frame in */
+    int16_t turned_q12;      /**< from HELD_ASKED on the sum of what the back-EMF's q part gained, a step each: flux times the angle turned */
+    uint16_t patience;       /**< steps that the back-EMF has to settle */
     uint16_t stood;          /**< since the rotor was as fast as it should be: 1 it has stood, so R is known; 2 and has turned again */
     dq_t emf_q12;            /**< filtered back-EMF of the last step; of an older one from HELD_ASKED on */
     int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind */

@@ -46,7 +46,7 @@ typedef struct {
     uint16_t broken_ms;       /**< how long its signal has been where no position is */
 } pot_t;
 
-/** What the ends of its travel mean. */
+/** What the ends of its travel mean: speeds, electrical rpm, or q currents, Q13, as its user says. */
 typedef struct {
     int16_t low, high;
 } pot_range_t;

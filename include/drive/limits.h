@@ -102,9 +102,8 @@ void bus_update_voltage_limit(drive_t *d, const drive_params_t *p);
 /** The bus of this moment, Q15 of full scale. @param v_bus_raw the converter's result, any value */
 int16_t bus_sample(int16_t v_bus_raw);
 
-/** Filters the bus, checks it, and follows the bus of this moment with the modulator's gain: after a step of the supply a late gain is a wrong
- *  voltage, which the estimator takes for speed. Slots 1, 5, 9, 13, in every state.
- *  @param v_bus_raw the converter's result, any value */
+/** Filters the bus, checks it, and follows the bus of this moment with the modulator's gain: after a step of the supply a late gain is a wrong voltage, which
+ *  the estimator takes for speed. Slots 1, 5, 9, 13, in every state. @param v_bus_raw the converter's result, any value */
 void bus_step(drive_t *d, const drive_params_t *p, int16_t v_bus_raw);
 
 /* ---- The brake chopper: a resistor on the bus turns into heat what the supply does not take back ----

@@ -39,8 +39,7 @@ typedef struct {
 /** 1 in the periods that a call of the slow work follows. With the bridge off something follows each period. */
 uint16_t schedule_is_due(uint16_t ticks);
 
-/** Runs the slot of these ticks, or its half, and marks its end in the self-test's flow signature.
- *  @param raw the converter's results of this period */
+/** Runs the slot of these ticks, or its half, and marks its end in the self-test's flow signature. @param raw the converter's results of this period */
 void schedule_run(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 
 #endif

@@ -68,12 +68,11 @@ uint16_t signals_phases(signals_t *s, const drive_t *d, const drive_params_t *p)
 /** Every millisecond in the background. @return drive_fault_t: CURRENT_SENSOR when the d current stays further off than dead time and noise make it, or none */
 uint16_t signals_d_current(signals_t *s, const drive_t *d, const drive_params_t *p);
 
-/** Every millisecond in the background, up to 100 turns of the field a second. Over whole turns the mean of a back-EMF is zero in the stator's frame, however the speed swings, for its
- *  integral is the flux, a function of the angle. What stays is R dI + V_dead 2/pi asin(dI/I) of a current signal that is off by dI, for the controllers
- *  let the current flow of which the signal makes a sine. Legs whose dead times differ by a fifth leave as much as is allowed; where hardly any current
- *  flows the converter's step leaves a fifth more. A sum's ends are a millisecond wide, so it may have a look of the back-EMF too many or too few: twice
- *  that is allowed on top.
- *  @return drive_fault_t: CURRENT_SENSOR when it is more over two times a quarter of a second and the turn's rest, or none */
+/** Every millisecond in the background, up to 100 turns of the field a second. Over whole turns the mean of a back-EMF is zero in the stator's frame, however
+ *  the speed swings, for its integral is the flux, a function of the angle. What stays is R dI + V_dead 2/pi asin(dI/I) of a current signal that is off by dI,
+ *  for the controllers let the current flow of which the signal makes a sine. Legs whose dead times differ by a fifth leave as much as is allowed; where hardly
+ *  any current flows the converter's step leaves a fifth more. A sum's ends are a millisecond wide, so it may have a look of the back-EMF too many or too few:
+ *  twice that is allowed on top. @return drive_fault_t: CURRENT_SENSOR when it is more over two times a quarter of a second and the turn's rest, or none */
 uint16_t signals_offset(signals_t *s, const drive_t *d, const drive_params_t *p);
 
 #endif

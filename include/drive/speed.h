@@ -22,12 +22,11 @@ void speed_schedule(drive_run_t *run, const drive_params_t *p);
 /** The q current that the controller asks for to hold a speed, within iq_limit_q13: gain times the speed's error, and the observed load. */
 current_q13_t speed_current(const drive_run_t *run, const drive_params_t *p, speed_erpm_t target_erpm);
 
-/** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer. It acts while the reference
- *  stands, nothing changes fast and no limit is reached, but waits in the steps in which the observer's load moves against the error by itself: while a
- *  load grows, the error is the observer's. While the speed swings it acts whatever else happens, for only an integral of all of the error holds the
- *  mean; its gain is constant then, and its speed the estimator's, for the controller's gain and the observer's rate change over a swing. It is
- *  forgotten otherwise.
- *  @param before_erpm the reference 16 periods ago @param iq_q13 the q current that is asked for */
+/** What the observer's estimate leaves of the speed's error at rest: an integral, slower than any rate of the observer. It acts while the reference stands,
+ *  nothing changes fast and no limit is reached, but waits in the steps in which the observer's load moves against the error by itself: while a load grows, the
+ *  error is the observer's. While the speed swings it acts whatever else happens, for only an integral of all of the error holds the mean; its gain is constant
+ *  then, and its speed the estimator's, for the controller's gain and the observer's rate change over a swing. It is forgotten otherwise. @param before_erpm
+ *  the reference 16 periods ago @param iq_q13 the q current that is asked for */
 void speed_trim(drive_run_t *run, const drive_params_t *p, speed_erpm_t before_erpm, current_q13_t iq_q13);
 
 /** 1 while the speed swings about its reference, as under a load that pulses with the shaft: it was far off to the other side four times, less than

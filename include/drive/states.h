@@ -150,8 +150,7 @@ uint16_t drive_shorts(const drive_t *d);
 /** What drives the bridge (outputs_t) in the drive's present state. */
 uint16_t drive_outputs(const drive_t *d);
 
-/** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise.
- *  @param direction +1 or -1 */
+/** Prepares a start and requests it. Called by the background while the drive is STOPPED; does nothing otherwise. @param direction +1 or -1 */
 void drive_start(drive_t *d, const drive_params_t *p, int16_t direction);
 
 /** A period with the bridge off or charging its drivers, after its duties: each state says which comes next, the gate lets it in or not. */

@@ -25,9 +25,8 @@ void drive_idle(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 /** 1 where the slow work has something to do in this period while the bridge switches: with deferred duties in each. */
 uint16_t drive_slow_follows(const drive_t *d);
 
-/** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period.
- *  With deferred duties the periods between the slots take the estimator's share, and the recorder's.
- *  @param raw the converter's results of this period @return 1 while the bridge goes on switching */
+/** Slow work after the duties of a period are written, for they have a deadline and this has none but the next period. With deferred duties the periods between
+ *  the slots take the estimator's share, and the recorder's. @param raw the converter's results of this period @return 1 while the bridge goes on switching */
 uint16_t drive_slow(drive_t *d, const drive_params_t *p, const drive_samples_t *raw);
 
 /* ---- What duties that act a period later add to a run: nothing where they act in time ---- */

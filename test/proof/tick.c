@@ -1,7 +1,7 @@
 /* A PWM period of the drive from every reachable state: no run-time error, no overflow, and the state's bounds hold again.
  *
  * modes: proof_tick TORQUE_MODE TUNING OPEN_LOOP_FUNCTIONING SCOPED LATE EACH EACH_LATE
- * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between,fieldweak_between,held_sum
+ * options: -eva-domains equality,symbolic-locations -eva-use-spec estimator_omega,observer_between,fieldweak_between,held_sum,held_along
  *     -eva-subdivide-non-linear-function vd_limit:100,estimator_oldest:100
  *     -inline-calls protection_check_current,drive_is_running,drive_raise,drive_enter,calibration_step,startup_bootstrap,idle_step,qm_abs
  *     -eva-slevel-function drive_tick:200,drive_idle:200,calibration_step:20,drive_zero:1000,lowpass_in_pieces:50,speed_ramp:10
@@ -23,6 +23,11 @@ int16_t estimator_omega(int16_t sum, int16_t sum_max, int16_t inv_kfi);
     assigns \result \from sign, emf;
     admit ensures length: -32767 <= \result <= 32767; */ /* circle.c, proof_lowpass: |d| + |q| is at most sqrt(2) times the length */
 static int16_t held_sum(int16_t sign, dq_t emf);
+
+/*@ requires axes: -emf_dq_max <= emf.d <= emf_dq_max && -emf_dq_max <= emf.q <= emf_dq_max;
+    assigns \result \from emf, ahead;
+    admit ensures length: -emf_dq_max <= \result <= emf_dq_max; */ /* emf_q_beside_d(): no part of a vector is longer than it, and emf_dq_max is its length */
+static int16_t held_along(dq_t emf, angle_t ahead);
 
 /*@ assigns \result \from a, b, share;
     admit ensures between: a <= \result <= b || b <= \result <= a; */ /* blocks.c, proof_between */

@@ -67,13 +67,13 @@ static void stands(int16_t direction, int16_t more_q12)
 
 /* ---- when it is asked ---- */
 
-void test_the_angle_stops_after_two_steps_far_below_the_reference_and_after_five_below_half_of_it(void)
+void test_the_angle_stops_after_two_steps_far_below_the_reference_five_below_half_of_it_and_sixteen_below_three_quarters(void)
 {
     EACH_DIRECTION(direction) {
         static const struct {
             int16_t speed_erpm;
             uint16_t steps;
-        } cases[] = { { FAST_ERPM / 8 - 10, 2 }, { FAST_ERPM / 8 - 1, 2 }, { -FAST_ERPM, 2 }, { FAST_ERPM / 8, 5 }, { FAST_ERPM / 8 + 10, 5 }, { FAST_ERPM / 2 - 10, 5 }, { FAST_ERPM / 2 + 10, 1000 } };
+        } cases[] = { { FAST_ERPM / 8 - 10, 2 }, { FAST_ERPM / 8 - 1, 2 }, { -FAST_ERPM, 2 }, { FAST_ERPM / 8, 5 }, { FAST_ERPM / 8 + 10, 5 }, { FAST_ERPM / 2 - 10, 5 }, { FAST_ERPM / 2 + 10, HELD_DOUBTS_DIP }, { FAST_ERPM * 3 / 4 - 10, HELD_DOUBTS_DIP }, { FAST_ERPM * 3 / 4 + 10, 1000 } };
         EACH(n, cases) {
             uint16_t count = 0;
             at(direction, FAST_ERPM, cases[n].speed_erpm, 0, 200);
@@ -110,12 +110,17 @@ void test_a_rotor_is_not_asked_where_no_resistance_explains_its_back_emf_nor_bef
     TEST_ASSERT_FALSE(held_angle_stands(shaft));
 }
 
-void test_a_rotor_at_exactly_half_of_the_reference_is_not_asked(void)
+void test_a_rotor_at_exactly_half_of_the_reference_is_asked_later_and_one_at_exactly_three_quarters_is_not_asked(void)
 {
     EACH_DIRECTION(direction) {
-        at(direction, FAST_ERPM, FAST_ERPM / 2, 0, 200);
+        at(direction, FAST_ERPM, FAST_ERPM * 3 / 4, 0, 200);
         steps(100);
         TEST_ASSERT_FALSE(held_angle_stands(shaft));
+        at(direction, FAST_ERPM, FAST_ERPM / 2, 0, 200);
+        steps(HELD_DOUBTS_DIP - 1u);
+        TEST_ASSERT_FALSE(held_angle_stands(shaft));
+        steps(1);
+        TEST_ASSERT_TRUE(held_angle_stands(shaft));
         at(direction, FAST_ERPM, FAST_ERPM / 2 - 1, 0, 200);
         steps(5);
         TEST_ASSERT_TRUE(held_angle_stands(shaft));
@@ -306,6 +311,14 @@ static int16_t angle_of(int32_t sum_q12)
     return (int16_t)((float)sum_q12 * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm());
 }
 
+/** By how far a back-EMF says that the rotor is ahead of a frame that stands, along the direction: its own direction, and what the filter is behind. */
+static int16_t ahead_of_frame(int16_t direction, int16_t d_q12, int16_t q_q12)
+{
+    const float counts = 65536.0F / 6.2831853F, size_q12 = hypotf((float)d_q12, (float)q_q12);
+    const float period = size_q12 * (float)shaft->inv_kfi / 2048.0F * counts_per_erpm() / 16.0F;
+    return (int16_t)(counts * atan2f((float)-d_q12, (float)(direction * q_q12)) + period * 65536.0F / (float)drive.run.model.kfilter_esdq_q16);
+}
+
 void test_a_back_emf_that_stands_still_is_resistance_and_turns_the_frame_back_by_what_it_had_turned(void)
 {
     static const int16_t more_q12[] = { 0, 40, 400, 1000, -400, -1000 }; /* of 4000 */
@@ -322,6 +335,29 @@ void test_a_back_emf_that_stands_still_is_resistance_and_turns_the_frame_back_by
             back = (int16_t)(angle_t)(before - estimator_next_angle(&drive.run.estimator));
             TEST_ASSERT_INT16_WITHIN(40 + qm_abs(turned) / 50, (int16_t)(direction * turned), back);
             TEST_ASSERT_EQUAL_INT16(0, drive.run.model.inv_kfi);
+        }
+    }
+}
+
+void test_a_rotor_that_came_to_its_stop_while_the_angle_stood_was_no_frame_that_r_i_had_turned(void)
+{
+    const int16_t falls_q12 = params.adaptation.emf_least_q12;
+    EACH_DIRECTION(direction) {
+        for (uint16_t falls = HELD_PATIENCE_STEPS - 1u; falls <= HELD_PATIENCE_STEPS; falls++) {
+            angle_t stopped;
+            int16_t back;
+            asked(direction, 400);
+            shaft->emf_q12.q = (int16_t)(direction * (400 + falls * falls_q12));
+            stopped = estimator_next_angle(&drive.run.estimator);
+            for (uint16_t n = falls; n-- != 0u;) {
+                rig_emf(0, (int16_t)(direction * (400 + n * falls_q12)));
+                steps(1);
+                TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+            }
+            (void)answered();
+            steps(1);
+            back = (int16_t)(direction * (int16_t)(angle_t)(stopped - estimator_next_angle(&drive.run.estimator)));
+            TEST_ASSERT_INT16_WITHIN(50, (falls < HELD_PATIENCE_STEPS) ? angle_of(3 * 400) : 0, back);
         }
     }
 }
@@ -561,6 +597,7 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
         float per_step;
         int16_t ahead;
         int32_t load_q16;
+        dq_t last = { 0, 0 };
         uint16_t count = 0;
         at(direction, FAST_ERPM, 1500, 0, 220); /* so slow that its turn hides in the steps in which it settles */
         drive.run.observer.load_q16 = (int32_t)direction * 77 * 65536;
@@ -574,18 +611,16 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
         while (shaft->phase == (uint16_t)HELD_ASKED && count < 2u * HELD_ASK_STEPS) {
             count++;
             rig_emf(qm_mulhi(-440, trig_sincos((angle_t)((float)count * per_step)).sin), (int16_t)(direction * 215));
+            last = estimator_emf(&drive.run.estimator);
             steps(1);
         }
         TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
         TEST_ASSERT_GREATER_OR_EQUAL_UINT16(HELD_ASK_STEPS, count);
         ahead = (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped);
-        { /* all steps with the first back-EMF, the last of them with 5 less; now it is 215 more what turned into the d axis */
-            const dq_t last = estimator_emf(&drive.run.estimator);
-            const float now_erpm = (215.0F + (float)qm_abs(last.d)) * (float)shaft->inv_kfi / 2048.0F;
-            const float turned = ((float)(HELD_SETTLE_STEPS + count) * 220.0F - (float)count * 5.0F) / 220.0F;
-            TEST_ASSERT_INT16_WITHIN(20, (int16_t)((float)direction * per_step * turned), ahead);
-            TEST_ASSERT_INT16_WITHIN(10, (int16_t)((float)direction * now_erpm), observer_speed(&drive.run.observer));
-        }
+        TEST_ASSERT_INT16_WITHIN(50, (int16_t)(direction * ahead_of_frame(direction, last.d, last.q)), ahead);
+        TEST_ASSERT_INT16_WITHIN(10, (int16_t)((float)direction * hypotf((float)last.d, (float)last.q) * (float)shaft->inv_kfi / 2048.0F), observer_speed(&drive.run.observer));
+        TEST_ASSERT_EQUAL_INT16(0, estimator_emf(&drive.run.estimator).d);
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)((float)direction * hypotf((float)last.d, (float)last.q)), estimator_emf(&drive.run.estimator).q);
         TEST_ASSERT_EQUAL_INT32(load_q16, drive.run.observer.load_q16);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
         TEST_ASSERT_NOT_EQUAL(0, drive.run.model.inv_kfi);
@@ -616,7 +651,7 @@ void test_a_back_emf_whose_turn_dead_time_would_hide_is_asked_for_longer(void)
     static const struct {
         int16_t emf_q12;
         uint16_t steps;
-    } cases[] = { { 400, HELD_ASK_STEPS }, { -400, HELD_ASK_STEPS }, { 40, HELD_ASK_MOST_STEPS }, { 0, HELD_ASK_MOST_STEPS } };
+    } cases[] = { { 400, HELD_ASK_STEPS }, { -400, HELD_ASK_STEPS }, { 40, HELD_ASK_MOST_STEPS }, { 0, HELD_ASK_MOST_STEPS }, { -40, HELD_ASK_STEPS } }; /* against the direction it is R i */
     EACH_DIRECTION(direction) {
         EACH(n, cases) {
             asked(direction, cases[n].emf_q12);
@@ -688,6 +723,7 @@ void test_a_back_emf_that_does_not_settle_is_a_rotor_that_turns(void)
     rig_emf(0, 10);
     steps(HELD_AGAIN_STEPS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase); /* not asked again at once */
+    TEST_ASSERT_EQUAL_UINT16(HELD_AGAIN_STEPS - 1u, shaft->doubted_steps); /* but R i may turn the frame meanwhile */
     steps(3);
     TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
 }
@@ -837,45 +873,74 @@ void test_the_first_steps_turn_right_after_a_question_began_anew_may_be_dead_tim
     TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
 }
 
-void test_a_back_emf_that_does_not_settle_turns_the_frame_by_its_sum_and_nothing_of_a_question_before_counts(void)
+void test_a_rotor_that_has_turned_all_the_time_is_where_its_back_emf_points_to_wherever_that_is(void)
 {
     EACH_DIRECTION(direction) {
-        angle_t stopped;
-        int32_t sum_q12 = 0;
-        at(direction, FAST_ERPM, 100, 0, 100);
-        shaft->turned_q12 = 5000;
-        steps(HELD_DOUBTS_MOST / HELD_DOUBTS_FAR + 1u);
-        TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
-        stopped = estimator_next_angle(&drive.run.estimator);
-        for (int16_t n = 0; held_angle_stands(shaft) && n < 20; n++) {
-            const int16_t q_q12 = (int16_t)(100 + 10 * n);
-            rig_emf((n & 1) ? 300 : -300, (int16_t)(direction * q_q12));
-            sum_q12 += q_q12;
-            steps(1);
+        for (int16_t degrees = -170; degrees <= 170; degrees = (int16_t)(degrees + 20)) {
+            const sincos_t at_angle = trig_sincos((angle_t)(degrees * 182));
+            const int16_t d_q12 = qm_mulhi(-1600, at_angle.sin), q_q12 = (int16_t)(direction * qm_mulhi(1600, at_angle.cos));
+            angle_t stopped;
+            asked(direction, 100);
+            shaft->turned_q12 = 5000; /* of a question before */
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
+            stopped = estimator_next_angle(&drive.run.estimator);
+            rig_emf(d_q12, q_q12);
+            held_act(&drive, &params);
+            TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
+            TEST_ASSERT_EQUAL_UINT16(0, shaft->stood);
+            TEST_ASSERT_INT16_WITHIN(60, (int16_t)(direction * ahead_of_frame(direction, d_q12, q_q12)), (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped));
+            TEST_ASSERT_EQUAL_INT16(0, estimator_emf(&drive.run.estimator).d);
+            TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * 800), estimator_emf(&drive.run.estimator).q);
+            TEST_ASSERT_INT16_WITHIN(40, (int16_t)((float)direction * 800.0F * (float)shaft->inv_kfi / 2048.0F), observer_speed(&drive.run.observer));
+            TEST_ASSERT_EQUAL_INT16(shaft->inv_kfi, drive.run.model.inv_kfi);
         }
-        TEST_ASSERT_EQUAL_UINT16(HELD_TURNS, shaft->phase);
-        TEST_ASSERT_INT16_WITHIN(4, (int16_t)(direction * angle_of(sum_q12)), (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped));
     }
 }
 
-void test_a_sum_beyond_the_format_turns_the_frame_along_by_no_more_than_the_fastest_rotor_would(void)
+void test_a_back_emf_with_more_in_the_d_axis_than_in_q_is_a_rotor_that_is_ahead_but_for_one_that_stood_or_falls(void)
 {
+    const int16_t least = params.adaptation.emf_least_q12;
+    const struct {
+        int16_t d_q12, q_q12, fell_q12;
+        uint16_t stood, turns;
+    } cases[] = {
+        { (int16_t)-(least + 1), 0, 0, 0, 1 }, { (int16_t)-least, 0, 0, 0, 0 },              /* dead time shakes it by as much */
+        { -301, 300, 0, 0, 1 }, { -300, 300, 0, 0, 0 },                                        /* 45 degrees */
+        { -300, -900, 0, 0, 1 },                                                               /* more than a quarter turn */
+        { 301, 0, 0, 0, 0 },                                                                   /* behind */
+        { -301, 0, 1, 0, 0 },                                                                 /* it comes to its stop */
+        { -301, 0, 0, 1, 0 },                                                                  /* R is known, and the frame was right */
+    };
     EACH_DIRECTION(direction) {
-        int16_t ahead[2];
-        for (uint16_t n = 0; n < 2u; n++) {
-            angle_t stopped;
-            asked(direction, 40);
-            stopped = estimator_next_angle(&drive.run.estimator);
-            shaft->phase = (uint16_t)HELD_ASKED;
-            shaft->steps = 3;
-            shaft->patience = 1;
-            shaft->emf_q12.q = (int16_t)(direction * ((n == 0u) ? 8000 : 16000)); /* 64000 wraps to less than nothing */
-            shaft->act = (uint16_t)HELD_HAS_TURNED;
-            held_act(&drive, &params);
-            ahead[n] = (int16_t)(direction * (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped));
+        EACH(n, cases) {
+            for (uint16_t settles = 0; settles < 2u; settles++) {
+                asked(direction, 0);
+                shaft->stood = cases[n].stood;
+                shaft->phase = (uint16_t)(settles ? HELD_SETTLES : HELD_ASKED);
+                shaft->steps = HELD_SETTLE_STEPS - 1u;
+                rig_emf(cases[n].d_q12, (int16_t)(direction * cases[n].q_q12));
+                shaft->emf_q12 = estimator_emf(&drive.run.estimator);
+                held_step(&drive, &params);
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE(HELD_WAITS, shaft->act, golden_row(n)); /* the frame's turn may shake it */
+                shaft->phase = (uint16_t)(settles ? HELD_SETTLES : HELD_ASKED);
+                shaft->steps = HELD_SETTLE_STEPS;
+                shaft->emf_q12.d = (int16_t)(cases[n].d_q12 - cases[n].fell_q12);
+                held_step(&drive, &params);
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE(cases[n].turns ? HELD_HAS_TURNED : HELD_WAITS, shaft->act, golden_row(n));
+            }
         }
-        TEST_ASSERT_GREATER_THAN_INT16(1000, ahead[0]);
-        TEST_ASSERT_EQUAL_INT16(ahead[0], ahead[1]);
+    }
+}
+
+void test_a_back_emf_that_is_small_says_nothing_of_a_rotor_that_turns_on(void)
+{
+    const int16_t least = params.adaptation.emf_least_q12;
+    for (int16_t more = 0; more < 2; more++) {
+        asked(1, 0);
+        shaft->steps = shaft->patience;
+        rig_emf(least, (int16_t)(least + more));
+        held_step(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16((more != 0) ? HELD_HAS_TURNED : HELD_WAITS, shaft->act);
     }
 }
 

@@ -892,9 +892,8 @@ static void mechanics_block(drive_t *d, const drive_params_t *p)
     }
 }
 
-/** The rotor slipped. One that swung while it was aligned is too heavy for the ramp, others are not free: what stood at the beginning stands
- *  again, and a ramp with a quarter of the acceleration follows. @return 1 when that is worth a try, and no back-EMF would drive more
- *  current than was asked for */
+/** The rotor slipped. One that swung while it was aligned is too heavy for the ramp, others are not free: what stood at the beginning stands again, and a ramp
+ *  with a quarter of the acceleration follows. @return 1 when that is worth a try, and no back-EMF would drive more current than was asked for */
 static uint16_t ramp_slower(drive_t *d, const drive_params_t *p)
 {
     static const pi_gains_t gains = { 0, 0, 0, SLOW_SHIFT };
@@ -1081,7 +1080,6 @@ dq_t identify_voltage(drive_t *d, int16_t sign)
     identify_t *id = &d->run.identify;
     drive_control_t *c = &d->run.control;
     pi_gains_t gains_d, gains_q;
-
     if (id->mode == (uint16_t)IDENTIFY_INJECT) {
         dq_t v;
         v.d = id->bias_q14;
@@ -1174,7 +1172,6 @@ void identify_run(drive_t *d, const drive_params_t *p, duties_t *duty)
     identify_t *id = &d->run.identify;
     drive_control_t *c = &d->run.control;
     int16_t sign;
-
     c->i_q13 = park(clarke(d->phases_q13.a, d->phases_q13.b), d->frame);
     identify_record(d, p, identify_turn(d, p));
     sign = identify_square(id);

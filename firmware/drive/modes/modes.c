@@ -122,7 +122,6 @@ uint16_t mode_current_step(drive_t *d UNUSED, const drive_params_t *p UNUSED, cu
 #ifdef TORQUE_MODE
     drive_run_t *run = &d->run;
     int16_t iq, speed = along_direction(d, observer_speed(&run->observer));
-
     *iq_q13 = 0;
     if (!mode_commands_current(d)) {
         return 0;
@@ -144,7 +143,6 @@ uint16_t mode_limit_reasons(const drive_t *d UNUSED, const drive_params_t *p UNU
 #ifdef TORQUE_MODE
     int16_t asked = qm_clamp(qm_abs(d->command.target_erpm), 0, d->run.control.iq_limit_q13);
     int16_t missing = qm_sub_limited(asked, along_direction(d, d->run.control.ref_q13.q));
-
     *reasons = (uint16_t)((qm_abs(missing) > (p->current_max_q13 >> 6)) ? LIMIT_SPEED_RANGE : LIMIT_NONE);
     return mode_commands_current(d);
 #else

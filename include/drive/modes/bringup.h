@@ -112,7 +112,6 @@ typedef struct {
     volatile int32_t sum_a, sum_b;   /**< of the currents */
     volatile int32_t off_a, off_b;   /**< of what they are off mean_a_q13 and mean_b_q13 */
     volatile current_q13_t mean_a_q13, mean_b_q13;
-
     /* The interrupt's own. */
     volatile int16_t amplitude; /**< duty counts along the vector; the background reads it */
     volatile int16_t part[3];   /**< of it in each phase, as rounded; the background reads them */

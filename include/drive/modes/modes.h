@@ -103,8 +103,7 @@ uint16_t mode_reference_step(drive_t *d, const drive_params_t *p);
 #define MODE_TWO_DIRECTIONS 0
 #endif
 
-/** The potentiometer's travel and direction. @param direction of the running motor, which the middle keeps; becomes +1 or -1
- *  @return the travel, Q16 */
+/** The potentiometer's travel and direction. @param direction of the running motor, which the middle keeps; becomes +1 or -1 @return the travel, Q16 */
 uint16_t mode_pot_split(uint16_t pot_q16, int16_t *direction);
 
 /* ---- TORQUE_MODE: the potentiometer commands the q current; speed is only limited ---- */

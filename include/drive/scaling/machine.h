@@ -50,7 +50,7 @@
 /** What noise and dead time make of the d current's mean deviation. A current within the ripple, E (1 - m) T / (4 L) at m = 1/2, changes its sign in
  *  the period and loses nothing to dead time: what compensates that drives the current, up to the ripple. */
 #define PARAM_RIPPLE_A (PARAM_F(NOMINAL_BUS_V) / PARAM_SQRT3 * PARAM_F(LOOPTIME_SEC) / (16.0F * PARAM_F(MOTOR_LS_MH) * 0.001F))
-#define PARAM_DEAD_OFF (PARAM_F(ID_OFF_DEAD) * PARAM_DEAD_TIME_V * PARAM_IU / (16.0F * PARAM_F(D_CURRCNTR_PTERM)))
+#define PARAM_DEAD_OFF (PARAM_F(ID_OFF_DEAD) * PARAM_DEAD_TIME_V * PARAM_IU / (16.0F * PARAM_F(D_CURRCNTR_PTERM))) /**< where the P term alone takes ID_OFF_DEAD of dead time's voltage */
 #define PARAM_ID_OFF (PARAM_F(ID_OFF_NOISE) * PARAM_F(MAXIMUM_CURRENT_A) + PARAM_MAX(PARAM_DEAD_OFF, PARAM_F(ID_OFF_RIPPLE) * PARAM_RIPPLE_A))
 
 /** Speed below which the short-circuited winding takes at most MAXIMUM_CURRENT_A, Kphi n/sqrt(3) = R I, in counts (STOP_MODE 2). R stands for |Z|:
