@@ -16,8 +16,7 @@ static uint16_t memory_is_variable(uint16_t address, uint16_t bytes)
     return (uint16_t)(from + bytes <= MEMORY_VARIABLE_BYTES);
 }
 
-/** The usual row in a straight line. Its addresses are volatile to be read first: none is used in the cycle after it was read.
- *  @return where the next one goes */
+/** The usual row in a straight line. Its addresses are volatile to be read first: none is used in the cycle after it was read. @return where the next one goes */
 QM_INLINE int16_t *scope_copy_usual(const scope_t *s)
 {
     const volatile int16_t *first = s->source[0], *second = s->source[1], *third = s->source[2], *fourth = s->source[3];

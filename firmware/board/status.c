@@ -41,8 +41,7 @@ static uint16_t waited_ms BOARD_UNSET;
 /* From here on the line has no room for it, a self-test and the end. */
 #define LIMITS_END (sizeof sent_line - sizeof LONGEST_LIMIT - sizeof " selftest 10\r\n")
 
-/** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". What finds no room waits for the next line.
- *  @return the text's end */
+/** Why the drive gave less than it was asked for since the last line: " limit CURRENT RAMP". What finds no room waits for the next line. @return the text's end */
 static char *put_limits(char *at)
 {
     const char *name = CHOPPER_USED ? DRIVE_LIMIT_TABLE(LIMIT_NAME) : DRIVE_LIMIT_TABLE_BARE(LIMIT_NAME);

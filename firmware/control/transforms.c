@@ -60,6 +60,11 @@ angle_t trig_direction(int16_t x, int16_t y)
     return (y < 0) ? (angle_t)~angle : angle; /* to a count */
 }
 
+NOINLINE int16_t qm_less(int16_t a, int16_t b)
+{
+    return qm_sub_limited(a, b);
+}
+
 /* ---- the forced angle ---- */
 
 QM_WRAPS int16_t forced_angle_accelerate(forced_angle_t *f, const forced_angle_params_t *p, int16_t direction, uint16_t periods)

@@ -30,16 +30,10 @@ uint16_t held_angle_stands(const held_t *shaft)
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
-/** a - b, as qm_sub_limited(), in one place. */
-static NOINLINE int16_t held_less(int16_t a, int16_t b)
-{
-    return qm_sub_limited(a, b);
-}
-
 /** How far the back-EMF has moved. */
 static uint16_t held_moved(dq_t emf, dq_t from)
 {
-    return (uint16_t)(qm_abs(held_less(emf.d, from.d)) + qm_abs(held_less(emf.q, from.q)));
+    return (uint16_t)(qm_abs(qm_less(emf.d, from.d)) + qm_abs(qm_less(emf.q, from.q)));
 }
 
 /** The size of a back-EMF, as held_moved(). */
@@ -117,7 +111,8 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf,
     if (along < (least >> 2)) {
         return HELD_DOUBTS_FAR;
     }
-    return (uint16_t)!observer_gate_is_closed(&run->observer); /* a load slows it down that the observer knows */
+    /* a load slows it down that the observer knows, or one that takes so much */
+    return (uint16_t)(!observer_gate_is_closed(&run->observer) && (along < least || !qm_beyond(run->control.ref_q13.q, qm_mulhi_su(p->current_max_q13, HELD_DIP_SHARE_Q16))));
 }
 
 /** The same lead, or a little more or less: a phase whose current is near zero hides what turns across it in dead time. The q current's is at each sixth turn. */
@@ -215,7 +210,7 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
     const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
     const int16_t before = qm_clamp(shaft->emf_q12.d, INT16_MIN, 0); /* what falls to 0 is the filter's tail */
-    const int16_t turned = held_less(before, emf.d);                 /* -E sin: negative to either side, with E's sign that of the speed */
+    const int16_t turned = qm_less(before, emf.d);                   /* -E sin: negative to either side, with E's sign that of the speed */
     const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least) && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
         shaft->act = (uint16_t)(held_has_turned(d, (uint16_t)(turns && tells)) ? HELD_HAS_TURNED : HELD_GOES_ON);
@@ -317,7 +312,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
     const uint16_t size = held_size(emf), before = held_size(shaft->emf_q12);
     const uint16_t shrinks = (uint16_t)(size + (moved >> 1) < before); /* more than it turns: that of a rotor which comes to its stop */
-    shaft->turned_q12 = held_less(shaft->turned_q12, held_less(shaft->emf_q12.q, emf.q));
+    shaft->turned_q12 = qm_less(shaft->turned_q12, qm_less(shaft->emf_q12.q, emf.q));
     if (held_is_ahead(d, emf, (int16_t)most)) {
         shaft->act = (uint16_t)HELD_HAS_TURNED;
         return;

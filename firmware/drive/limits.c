@@ -183,7 +183,7 @@ static uint16_t limits_current_reasons(const drive_control_t *c, const drive_par
 static uint16_t limits_ramp_reasons(const drive_t *d, const drive_params_t *p)
 {
     speed_erpm_t target = mode_speed_target(d, p);
-    int16_t left = qm_abs(qm_sub_limited(target, d->run.control.reference_erpm));
+    int16_t left = qm_abs(qm_less(target, d->run.control.reference_erpm));
     if (d->run.control.ramp_waits) {
         return (uint16_t)LIMIT_RAMP | (uint16_t)LIMIT_RAMP_WAITS;
     }

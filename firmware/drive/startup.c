@@ -208,7 +208,7 @@ void handover_wait(drive_t *d, const drive_params_t *p)
     }
     forced = handover_forced_erpm(d, p);
     seen = along_direction(d, estimator_speed(&d->run.estimator));
-    ahead = qm_sub_limited(seen, forced);
+    ahead = qm_less(seen, forced);
     h->ahead_erpm = (int16_t)(h->ahead_erpm + ((ahead - h->ahead_erpm) >> HANDOVER_MEAN_SHIFT));
     if (!at_end && forced < p->early_erpm) { /* the two may be one speed, which is counted down */
         return;

@@ -14,9 +14,8 @@ void application_init(void);
 /** A pass of the background: the application decides. Its lights are on their pins afterwards. */
 void application_tick(uint16_t elapsed_ms);
 
-/** Each pass of the slow work: an application that does not return is late after APP_LATE_MS. Then the drive stops in order, for APPLICATION_STOP_SEC
- *  at most, and then the fault is APPLICATION, also where it has returned meanwhile. If it does not, the watchdog, which has been served until then, resets
- *  the processor. */
+/** Each pass of the slow work: an application that does not return is late after APP_LATE_MS. Then the drive stops in order, for APPLICATION_STOP_SEC at most, and
+ *  then the fault is APPLICATION, also where it has returned meanwhile. If it does not, the watchdog, which has been served until then, resets the processor. */
 void application_watch(void);
 
 #if APP_SERIAL

@@ -98,8 +98,7 @@ void estimator_filter_speed(estimator_t *e, const estimator_params_t *p);
 /** The estimator's own frame for the next two periods, in the mean of the two; they need it while the forced angle drives the motor. */
 void estimator_turn_frame(estimator_t *e);
 
-/** What the back-EMF says of speed and angle, while the estimator's angle drives the motor. @param e_q13 see estimator_back_emf()
- *  @param frame of the control */
+/** What the back-EMF says of speed and angle, while the estimator's angle drives the motor. @param e_q13 see estimator_back_emf() @param frame of the control */
 void estimator_track(estimator_t *e, const estimator_params_t *p, const motor_model_t *t, alphabeta_t e_q13, sincos_t frame);
 
 /** The same in a frame of its own, while the forced angle drives the motor (ALIGN and RAMP). */

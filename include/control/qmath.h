@@ -192,6 +192,9 @@ QM_INLINE int16_t qm_sub_limited(int16_t a, int16_t b)
     return qm_within((int32_t)a - b, -16383, 16383);
 }
 
+/** qm_sub_limited() in one place, for where bytes count more than cycles. */
+int16_t qm_less(int16_t a, int16_t b);
+
 /** x * 2^bits; the caller proves that it fits. @param bits 0..15 */
 QM_INLINE QM_WRAPS int32_t qm_shift(int32_t x, uint16_t bits)
 {

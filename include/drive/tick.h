@@ -51,8 +51,7 @@ dq_t deferred_currents(const drive_run_t *run);
 /** That of this period's pulse: the slow work follows the second one. */
 const dead_duties_t *dead_of_pulse(const drive_t *d);
 
-/** That of the second pulse, where it has its own: a step after the first. The forced angle is slow, there it is the same.
- *  @param asked currents of the first */
+/** That of the second pulse, where it has its own: a step after the first. The forced angle is slow, there it is the same. @param asked currents of the first */
 void dead_prepare_second(drive_t *d, const drive_params_t *p, dq_t asked);
 
 #endif

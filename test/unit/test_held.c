@@ -77,6 +77,7 @@ void test_the_angle_stops_after_two_steps_far_below_the_reference_five_below_hal
         EACH(n, cases) {
             uint16_t count = 0;
             at(direction, FAST_ERPM, cases[n].speed_erpm, 0, 200);
+            drive.run.control.ref_q13.q = (int16_t)(direction * (params.current_max_q13 * 5l / 8));
             while (!held_angle_stands(shaft) && count < 1000u) {
                 steps(1);
                 count++;
@@ -117,6 +118,10 @@ void test_a_rotor_at_exactly_half_of_the_reference_is_asked_later_and_one_at_exa
         steps(100);
         TEST_ASSERT_FALSE(held_angle_stands(shaft));
         at(direction, FAST_ERPM, FAST_ERPM / 2, 0, 200);
+        drive.run.control.ref_q13.q = (int16_t)(direction * (params.current_max_q13 * 5l / 8 + 2)); /* so large a load makes it dip */
+        steps(100);
+        TEST_ASSERT_FALSE(held_angle_stands(shaft));
+        drive.run.control.ref_q13.q = (int16_t)(direction * (params.current_max_q13 * 5l / 8));
         steps(HELD_DOUBTS_DIP - 1u);
         TEST_ASSERT_FALSE(held_angle_stands(shaft));
         steps(1);
@@ -893,6 +898,8 @@ void test_a_rotor_that_has_turned_all_the_time_is_where_its_back_emf_points_to_w
             TEST_ASSERT_INT16_WITHIN(3, (int16_t)(direction * 800), estimator_emf(&drive.run.estimator).q);
             TEST_ASSERT_INT16_WITHIN(40, (int16_t)((float)direction * 800.0F * (float)shaft->inv_kfi / 2048.0F), observer_speed(&drive.run.observer));
             TEST_ASSERT_EQUAL_INT16(shaft->inv_kfi, drive.run.model.inv_kfi);
+            TEST_ASSERT_EQUAL_HEX32(drive.run.estimator.rho_q32, drive.run.observer.rho_q32);
+            TEST_ASSERT_EQUAL_INT32(drive.run.estimator.omega_filtered_q16, drive.run.observer.omega_q16);
         }
     }
 }

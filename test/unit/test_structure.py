@@ -85,7 +85,7 @@ PREFIXES = {
     "control/current_control": "current pi vd voltage vq",
     "control/motor_model": "adaptation fieldweak salience",
     "control/soft_float": "root soft",
-    "control/transforms": "forced trig",
+    "control/transforms": "forced qm trig",
     "drive/limits": "bus limits",
     "drive/model": "drive model salient",
     "drive/modes/bringup": "bringup mode",
