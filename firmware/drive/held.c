@@ -96,7 +96,7 @@ static void held_turn_back(drive_t *d, const drive_params_t *p, int16_t lead)
     handover_preset(d, p, e->next);
 }
 
-/** How much a step says for a rotor that stands: it is slower than three quarters of its reference, and R i may be all of the back-EMF. Once R is known it is
+/** How much a step says for a rotor that stands: it is slower than half of its reference, and R i may be all of the back-EMF. Once R is known it is
  *  a rotor without back-EMF. @param along observed speed @param least what counts as a stall, half of the reference */
 static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf, speed_erpm_t along, speed_erpm_t least)
 {
@@ -105,14 +105,13 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf,
         const uint16_t off = (uint16_t)((run->held.steps < HELD_SLOW_STEPS) ? 0 : model_header_ri(p, qm_abs(run->control.i_q13.q)) >> HELD_R_SHIFT);
         return (uint16_t)((held_size(emf) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
     }
-    if (along >= least + (least >> 1) || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d) || !protection_rotor_is_doubtful(run, p)) {
+    if (along >= least || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d) || !protection_rotor_is_doubtful(run, p)) {
         return 0;
     }
     if (along < (least >> 2)) {
         return HELD_DOUBTS_FAR;
     }
-    /* a load slows it down that the observer knows, or one that takes so much */
-    return (uint16_t)(!observer_gate_is_closed(&run->observer) && (along < least || !qm_beyond(run->control.ref_q13.q, qm_mulhi_su(p->current_max_q13, HELD_DIP_SHARE_Q16))));
+    return (uint16_t)!observer_gate_is_closed(&run->observer); /* a load slows it down that the observer knows */
 }
 
 /** The same lead, or a little more or less: a phase whose current is near zero hides what turns across it in dead time. The q current's is at each sixth turn. */
@@ -274,7 +273,7 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
         doubts = (uint16_t)((shaft->stood != 0u) ? doubts : 0u); /* it stood, and speeds up */
     }
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
-    if (shaft->doubts >= ((along < least) ? HELD_DOUBTS_MOST : HELD_DOUBTS_DIP) && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
+    if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
         shaft->act = (uint16_t)HELD_STOP;
     }
 }

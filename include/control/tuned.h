@@ -123,8 +123,6 @@
 
 /* ---- Held shaft ---- */
 #define HELD_DOUBTS_MOST 5u   /* [1] steps of 16 periods, below half the reference, that look like a held rotor: then the angle stands | loadsteps */
-#define HELD_DOUBTS_DIP 16u   /* [1] up to three quarters of it, as a load makes it dip to for a while | soak */
-#define HELD_DIP_SHARE_Q16 40960u /* [Q16] but not where more than 5/8 of the largest current is asked for: a load step makes it dip so far | lowspeed */
 #define HELD_DOUBTS_FAR 3u    /* [1] below an eighth of the reference a step counts as many | held */
 #define HELD_DOUBTS_SWINGS 40u /* [1] and where the speed swings, for then it is so slow in each turn | pulse */
 #define HELD_LAG_SHIFT 2      /* [shift] of what the back-EMF's filter is behind 1/4 is forgotten a step, before a rotor is doubted | held */
