@@ -152,7 +152,7 @@ void test_difference_and_mean_are_those_of_17_bits_at_every_edge(void)
         for (int32_t b = -32768; b <= 32767; b++) {
             int32_t difference = (int32_t)edges[n] - b;
             int32_t limited = (difference > 16383) ? 16383 : (difference < -16383) ? -16383 : difference;
-            if (qm_sub_limited(edges[n], (int16_t)b) != limited || qm_mean(edges[n], (int16_t)b) != (((int32_t)edges[n] + b) >> 1)) {
+            if (qm_sub_limited(edges[n], (int16_t)b) != limited || qm_less(edges[n], (int16_t)b) != limited || qm_mean(edges[n], (int16_t)b) != (((int32_t)edges[n] + b) >> 1)) {
                 TEST_FAIL_MESSAGE("a pair differs");
             }
         }
