@@ -30,16 +30,17 @@ uint16_t held_angle_stands(const held_t *shaft)
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
-/** How far the back-EMF has moved. */
-static uint16_t held_moved(dq_t emf, dq_t from)
-{
-    return (uint16_t)(qm_abs(qm_less(emf.d, from.d)) + qm_abs(qm_less(emf.q, from.q)));
-}
-
-/** The size of a back-EMF, as held_moved(). */
+/** The size of a back-EMF, the sum of both parts'. */
 static NOINLINE uint16_t held_size(dq_t emf)
 {
     return (uint16_t)((uint16_t)qm_abs(emf.d) + (uint16_t)qm_abs(emf.q));
+}
+
+/** How far the back-EMF has moved. */
+static uint16_t held_moved(dq_t emf, dq_t from)
+{
+    const dq_t by = { qm_less(emf.d, from.d), qm_less(emf.q, from.q) };
+    return held_size(by);
 }
 
 /** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
@@ -130,7 +131,10 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     int16_t lead;
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
-    lead = (d->run.probe_phase == (uint16_t)PROBE_TEST) ? 0 : held_lead(&d->run, p, shaft->lag_q12); /* a probe's d current takes a speed that was none */
+    lead = held_lead(&d->run, p, shaft->lag_q12);
+    if (d->run.probe_phase == (uint16_t)PROBE_TEST) { /* its d current took a speed that was none: R i */
+        lead = (int16_t)(uint16_t)((uint16_t)(d->run.estimator.rho_q32 >> 16) - shaft->went);
+    }
     shaft->patience = (uint16_t)((d_current_goes || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS);
     held_turn_back(d, p, held_clear_of_zero(d, lead));
     held_enter(shaft, HELD_SETTLES);
@@ -265,6 +269,9 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     uint16_t doubts = held_doubts(d, p, emf, along, least);
     held_follow_lag(shaft, &d->run, emf);
     shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
+    if (along >= least + (least >> 1)) {                         /* three quarters of the reference */
+        shaft->went = (angle_t)(d->run.estimator.rho_q32 >> 16); /* what turns the frame from here on may be R i */
+    }
     if (shaft->phase != (uint16_t)HELD_NOT) { /* until it is back at its speed, or may be asked again */
         if (along >= least || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS)) {
             held_enter(shaft, HELD_NOT);

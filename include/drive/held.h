@@ -46,6 +46,7 @@ typedef struct {
     int16_t emf_sum_max_q12; /**< and its limit of the sum of back-EMFs */
     int16_t load;            /**< the load before all that, in units of the load observer: high word of its load_q16 */
     int16_t run_on;          /**< by how much R i had turned the frame, angle counts */
+    angle_t went;            /**< the frame's angle when the speed was last above three quarters of the reference */
 } held_t;
 
 /** 1 while the angle stands. The model's 1/Kphi is 0 then: no back-EMF turns the angle. */

@@ -262,6 +262,30 @@ void test_a_back_emf_that_is_lost_at_once_turns_the_frame_back_by_its_lag_and_th
     }
 }
 
+void test_a_rotor_that_a_probe_finds_standing_is_where_the_frame_was_when_its_speed_fell_below_three_quarters(void)
+{
+    EACH_DIRECTION(direction) {
+        static const struct {
+            int16_t speed_erpm; /* while R i turns the frame on */
+            int16_t back;       /* turns the frame back by */
+        } cases[] = { { FAST_ERPM / 4 * 3 - 10, 20000 }, { FAST_ERPM / 4 * 3 + 10, 0 } };
+        EACH(n, cases) {
+            uint32_t rho_q32;
+            at(direction, FAST_ERPM, FAST_ERPM - 10, 0, 200);
+            steps(1);
+            rho_q32 = drive.run.estimator.rho_q32;
+            drive.run.estimator.rho_q32 += (uint32_t)(uint16_t)(direction * 20000) << 16;
+            rig_speed((int16_t)(direction * cases[n].speed_erpm));
+            steps(1);
+            drive.run.probe_phase = (uint16_t)PROBE_TEST;
+            rig_speed((int16_t)(direction * 100));
+            steps(2);
+            TEST_ASSERT_TRUE(held_angle_stands(shaft));
+            TEST_ASSERT_INT16_WITHIN(HELD_CLEAR_ANGLE, direction * (20000 - cases[n].back), (int16_t)((drive.run.estimator.rho_q32 - rho_q32) >> 16));
+        }
+    }
+}
+
 void test_the_angle_stands_where_each_phase_carries_a_current_that_does_not_hide_in_dead_time(void)
 {
     EACH_DIRECTION(direction) {
