@@ -30,17 +30,16 @@ uint16_t held_angle_stands(const held_t *shaft)
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
-/** The size of a back-EMF, the sum of both parts'. */
-static NOINLINE uint16_t held_size(dq_t emf)
+/** How far the back-EMF has moved: the sum of both parts' sizes. */
+static NOINLINE uint16_t held_moved(dq_t emf, dq_t from)
 {
-    return (uint16_t)((uint16_t)qm_abs(emf.d) + (uint16_t)qm_abs(emf.q));
+    return (uint16_t)((uint16_t)qm_abs(qm_less(emf.d, from.d)) + (uint16_t)qm_abs(qm_less(emf.q, from.q)));
 }
 
-/** How far the back-EMF has moved. */
-static uint16_t held_moved(dq_t emf, dq_t from)
+/** And how large it is. */
+static NOINLINE uint16_t held_size(dq_t emf)
 {
-    const dq_t by = { qm_less(emf.d, from.d), qm_less(emf.q, from.q) };
-    return held_size(by);
+    return held_moved(emf, (dq_t){ 0, 0 });
 }
 
 /** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
@@ -255,7 +254,7 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
 /** What a filter of the back-EMF is behind: what the voltage has changed by, less what the estimator took back by itself through Ed. */
 static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
-    const int32_t taken_back = run->estimator.sign * (qm_mulss(emf.d, run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT);
+    const int32_t taken_back = qm_mulss((int16_t)(run->estimator.sign * emf.d), run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT;
     const int16_t forgotten = (int16_t)((shaft->doubted_steps != 0u) ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT); /* of what happens at once all counts */
     const int32_t lag = (int32_t)shaft->lag_q12 - forgotten + shaft->emf_q12.q - emf.q - taken_back;
     shaft->lag_q12 = qm_within(lag, -32767, 32767);
@@ -305,10 +304,20 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
     observer_preset(&d->run.observer, &p->observer, d->run.estimator.rho_q32, 0, salient_torque(&d->run, d->run.control.ref_q13.q));
 }
 
-/** Has it turned all the time? A back-EMF that does not come to stand says so. One that grows says so at once. @param size its size, and before */
-static uint16_t held_turns_on(const held_t *shaft, uint16_t size, uint16_t before, uint16_t least_q12)
+/** Has the rotor turned all the time? A back-EMF that does not come to stand says so, and one that grows at once. One that shrinks is of a rotor that comes to its stop. */
+static void held_settle(held_t *shaft, dq_t emf, uint16_t moved, uint16_t least_q12)
 {
-    return (uint16_t)(size > 2u * least_q12 && (shaft->steps > shaft->patience || (size > before + least_q12 && shaft->steps > HELD_PATIENCE_STEPS)));
+    const uint16_t size = held_size(emf), before = held_size(shaft->emf_q12), patient = (uint16_t)(shaft->steps <= HELD_PATIENCE_STEPS);
+    if (moved > least_q12 >> 1 || shaft->steps < HELD_SETTLE_STEPS) { /* the current changes, or it turns */
+        if (size + (moved >> 1) >= before && size > 2u * least_q12 && (shaft->steps > shaft->patience || (size > before + least_q12 && !patient))) {
+            shaft->act = (uint16_t)HELD_HAS_TURNED;
+        }
+    } else {
+        shaft->turned_q12 = 0;
+        shaft->doubted_steps = (uint16_t)(patient ? shaft->doubted_steps + 1u : 0u); /* it stood, or came to its stop since */
+        held_enter(shaft, HELD_ASKED);
+    }
+    shaft->emf_q12 = emf;
 }
 
 /** The angle stands. */
@@ -316,26 +325,13 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
-    const uint16_t size = held_size(emf), before = held_size(shaft->emf_q12);
-    const uint16_t shrinks = (uint16_t)(size + (moved >> 1) < before); /* more than it turns: that of a rotor which comes to its stop */
     shaft->turned_q12 = qm_less(shaft->turned_q12, qm_less(shaft->emf_q12.q, emf.q));
     if (held_is_ahead(d, emf, (int16_t)most)) {
         shaft->act = (uint16_t)HELD_HAS_TURNED;
         return;
     }
     switch (shaft->phase) {
-    case HELD_SETTLES:
-        if (moved > most >> 1 || shaft->steps < HELD_SETTLE_STEPS) { /* the current changes, or it turns */
-            if (!shrinks && held_turns_on(shaft, size, before, most)) {
-                shaft->act = (uint16_t)HELD_HAS_TURNED;
-            }
-        } else {
-            shaft->turned_q12 = 0;
-            shaft->doubted_steps = (uint16_t)((shaft->steps > HELD_PATIENCE_STEPS) ? 0u : shaft->doubted_steps + 1u); /* it stood, or came to its stop since */
-            held_enter(shaft, HELD_ASKED);
-        }
-        shaft->emf_q12 = emf;
-        break;
+    case HELD_SETTLES: held_settle(shaft, emf, moved, most); break;
     case HELD_ASKED: held_compare(d, p, emf, moved); break;
     default: held_push(d, p, emf, moved); break; /* HELD_STANDS */
     }
