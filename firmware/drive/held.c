@@ -255,7 +255,9 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
 static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
     const int32_t taken_back = qm_mulss((int16_t)(run->estimator.sign * emf.d), run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT;
-    const int16_t forgotten = (int16_t)((shaft->doubted_steps != 0u) ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT); /* of what happens at once all counts */
+    const int16_t left = (int16_t)(uint16_t)((uint16_t)emf.q - (uint16_t)shaft->lag_q12);
+    const uint16_t at_once = (uint16_t)(shaft->doubted_steps != 0u || ((left ^ shaft->lag_q12) < 0 && (run->estimator.sign ^ shaft->lag_q12) >= 0)); /* most of the back-EMF is in the filter alone: all counts */
+    const int16_t forgotten = (int16_t)(at_once ? 0 : shaft->lag_q12 >> HELD_LAG_SHIFT);
     const int32_t lag = (int32_t)shaft->lag_q12 - forgotten + shaft->emf_q12.q - emf.q - taken_back;
     shaft->lag_q12 = qm_within(lag, -32767, 32767);
 }
@@ -268,8 +270,8 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
     uint16_t doubts = held_doubts(d, p, emf, along, least);
     held_follow_lag(shaft, &d->run, emf);
     shaft->doubted_steps = (uint16_t)((doubts != 0u) ? shaft->doubted_steps + 1u : 0u);
-    if (along >= least + (least >> 1)) {                         /* three quarters of the reference */
-        shaft->went = (angle_t)(d->run.estimator.rho_q32 >> 16); /* what turns the frame from here on may be R i */
+    if (along_direction(d, estimator_speed(&d->run.estimator)) >= least + (least >> 1)) { /* the observer's follows the current, too */
+        shaft->went = (angle_t)(d->run.estimator.rho_q32 >> 16);                          /* what turns the frame in a dip may be R i */
     }
     if (shaft->phase != (uint16_t)HELD_NOT) { /* until it is back at its speed, or may be asked again */
         if (along >= least || (shaft->stood == 0u && shaft->steps >= HELD_AGAIN_STEPS)) {
