@@ -255,9 +255,9 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
 static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
     const int16_t taken_back = qm_within(qm_mulss((int16_t)(run->estimator.sign * emf.d), run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT, -16383, 16383);
-    const int16_t lag = shaft->lag_q12, left = (int16_t)(uint16_t)((uint16_t)emf.q - (uint16_t)lag);
-    const uint16_t at_once = (uint16_t)(shaft->doubted_steps != 0u || ((left ^ lag) < 0 && (run->estimator.sign ^ lag) >= 0)); /* most of the back-EMF is in the filter alone: all counts */
-    shaft->lag_q12 = qm_less((int16_t)(at_once ? lag : lag - (lag >> HELD_LAG_SHIFT)), qm_less(taken_back, (int16_t)(shaft->emf_q12.q - emf.q)));
+    const int16_t lag = shaft->lag_q12, old = (int16_t)(lag >> HELD_LAG_SHIFT), left = (int16_t)(uint16_t)((uint16_t)emf.q - (uint16_t)old);
+    const uint16_t at_once = (uint16_t)(shaft->doubted_steps != 0u || ((left ^ lag) < 0 && (run->estimator.sign ^ lag) >= 0)); /* the filter alone has a back-EMF: all counts */
+    shaft->lag_q12 = qm_less((int16_t)(at_once ? lag : lag - old), qm_less(taken_back, (int16_t)(shaft->emf_q12.q - emf.q)));
 }
 
 /** The angle turns, and something changes fast or the rotor is slow. */

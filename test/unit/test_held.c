@@ -428,6 +428,22 @@ void test_of_a_back_emf_that_falls_slowly_the_frame_is_turned_back_by_the_last_s
     TEST_ASSERT_LESS_THAN_INT16(50, shaft->lag_q12);
 }
 
+void test_what_the_filter_alone_has_of_a_back_emf_is_not_forgotten_while_the_speed_follows(void)
+{
+    EACH_DIRECTION(direction) {
+        static const struct {
+            int16_t before_q12, after_q12, lag_q12; /* three steps after it */
+        } cases[] = { { 900, 0, 900 }, { 900, -80, 980 }, { 1000, 199, 801 }, { 1000, 204, 336 }, { 0, 900, -380 } }; /* the last one speeds up */
+        EACH(n, cases) {
+            at(direction, FAST_ERPM, FAST_ERPM / 4 * 3, 0, cases[n].before_q12);
+            rig_emf(0, (int16_t)(direction * cases[n].after_q12));
+            steps(4);
+            TEST_ASSERT_EQUAL_UINT16(0, shaft->doubted_steps);
+            TEST_ASSERT_INT16_WITHIN(2, direction * cases[n].lag_q12, shaft->lag_q12);
+        }
+    }
+}
+
 void test_a_back_emf_against_the_direction_is_doubted_as_far_as_the_winding_may_have_less_resistance(void)
 {
     const int16_t r_less = (int16_t)qm_mulhi(2 * 4000, (int16_t)-params.rs_off_least), most = (int16_t)(r_less + params.adaptation.emf_least_q12);
