@@ -123,7 +123,7 @@ QM_WRAPS static int16_t held_clear_of_zero(const drive_t *d, int16_t lead)
 }
 
 /** The angle stops where a rotor would be that stopped at once. */
-static void held_stop_angle(drive_t *d, const drive_params_t *p)
+static void held_stop_angle(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     const uint16_t d_current_goes = qm_beyond(d->run.control.ref_q13.d, (int16_t)(p->current_max_q13 >> HELD_FAR_SHIFT));
@@ -131,7 +131,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p)
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = held_lead(&d->run, p, shaft->lag_q12);
-    if (d->run.probe_phase == (uint16_t)PROBE_TEST) { /* its d current took a speed that was none: R i */
+    if (d->run.probe_phase == (uint16_t)PROBE_TEST && 2 * emf.d > along_direction(d, emf.q)) { /* the back-EMF lies along the probe's current: R i */
         lead = (int16_t)(uint16_t)((uint16_t)(d->run.estimator.rho_q32 >> 16) - shaft->went);
     }
     shaft->patience = (uint16_t)((d_current_goes || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS);
@@ -364,7 +364,7 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
     const uint16_t act = shaft->act;
     shaft->act = (uint16_t)HELD_WAITS;
     switch (act) {
-    case HELD_STOP: held_stop_angle(d, p); break;
+    case HELD_STOP: held_stop_angle(d, p, emf); break;
     case HELD_HAS_TURNED:
     case HELD_GOES_ON: held_go_on(d, p, emf, (uint16_t)(act == (uint16_t)HELD_GOES_ON)); break;
     case HELD_LEARN:
