@@ -131,7 +131,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->inv_kfi = d->run.model.inv_kfi;
     shaft->emf_sum_max_q12 = d->run.model.emf_sum_max_q12;
     lead = held_lead(&d->run, p, shaft->lag_q12);
-    if (d->run.probe_phase == (uint16_t)PROBE_TEST && 2 * emf.d > along_direction(d, emf.q)) { /* the back-EMF lies along the probe's current: R i */
+    if (d->run.probe_phase == (uint16_t)PROBE_TEST && emf.d > along_direction(d, emf.q) >> 1) { /* the back-EMF lies along the probe's current: R i */
         lead = (int16_t)(uint16_t)((uint16_t)(d->run.estimator.rho_q32 >> 16) - shaft->went);
     }
     shaft->patience = (uint16_t)((d_current_goes || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS);
@@ -257,7 +257,7 @@ static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
     const int16_t taken_back = qm_within(qm_mulss((int16_t)(run->estimator.sign * emf.d), run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT, -16383, 16383);
     const int16_t lag = shaft->lag_q12, old = (int16_t)(lag >> HELD_LAG_SHIFT), left = (int16_t)(uint16_t)((uint16_t)emf.q - (uint16_t)old);
     const uint16_t at_once = (uint16_t)(shaft->doubted_steps != 0u || ((left ^ lag) < 0 && (run->estimator.sign ^ lag) >= 0)); /* the filter alone has a back-EMF: all counts */
-    shaft->lag_q12 = qm_less((int16_t)(at_once ? lag : lag - old), qm_less(taken_back, (int16_t)(shaft->emf_q12.q - emf.q)));
+    shaft->lag_q12 = qm_less(at_once ? lag : (int16_t)(uint16_t)((uint16_t)lag - (uint16_t)old), qm_less(taken_back, (int16_t)(uint16_t)((uint16_t)shaft->emf_q12.q - (uint16_t)emf.q)));
 }
 
 /** The angle turns, and something changes fast or the rotor is slow. */
