@@ -277,6 +277,7 @@ void test_a_rotor_that_a_probe_finds_standing_is_where_the_frame_was_when_its_sp
             rho_q32 = drive.run.estimator.rho_q32;
             drive.run.estimator.rho_q32 += (uint32_t)(uint16_t)(direction * 20000) << 16;
             rig_speed((int16_t)(direction * cases[n].speed_erpm));
+            drive.run.observer.omega_q16 = (int32_t)(direction * FAST_ERPM) * 65536; /* follows the current, too */
             steps(1);
             drive.run.probe_phase = (uint16_t)PROBE_TEST;
             rig_speed((int16_t)(direction * 100));
