@@ -45,7 +45,9 @@ static judged_t judged BOARD_UNSET;
 void firmware_trip(drive_fault_t fault)
 {
     pwm_outputs_off();
-    drive_raise(&board_drive, fault);
+    if (board_drive.fault == (uint16_t)FAULT_NONE) { /* the first one stays, and need not be raised again: it would be by code that may be damaged */
+        drive_raise(&board_drive, fault);
+    }
 }
 
 /** @param found drive_fault_t, none too */

@@ -168,7 +168,9 @@ static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t s
     const int16_t sign = along_direction(d, 1);
     speed_erpm_t omega_erpm;
     if (stood) {
-        run->observer.load_q16 = (shaft->stood == 1u) ? (int32_t)shaft->load * 65536 : run->observer.load_q16;
+        if (shaft->stood == 1u) {
+            run->observer.load_q16 = (int32_t)shaft->load * 65536;
+        }
         shaft->stood = 2;
         held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
     } else {
@@ -202,8 +204,7 @@ static uint16_t held_is_ahead(const drive_t *d, dq_t emf, int16_t least_q12)
     return (uint16_t)(shaft->stood == 0u && shaft->steps > HELD_SETTLE_STEPS && emf.d <= shaft->emf_q12.d && -emf.d > along_direction(d, emf.q) && -emf.d > least_q12);
 }
 
-/** Both stand: has the back-EMF changed, or turned as that of a rotor that turns? Where that would be too little to tell, the question goes on, and one
- *  that changes then was let go, or is so slow that its turn by itself is known. */
+/** Both stand: has the back-EMF changed, or turned as a rotor's would? Where that were too little to tell it is asked on: one that changes then was let go, or is slow. */
 static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
 {
     held_t *shaft = &d->run.held;
@@ -234,8 +235,7 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
     const uint16_t ri_q12 = (uint16_t)model_header_ri(p, qm_abs(iq_q13)), more_q12 = (uint16_t)qm_abs(emf.q);
     held_enter(shaft, HELD_STANDS);
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
-        int16_t share = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767;
-        share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-share : share;
+        const int16_t part = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767, share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-part : part;
         if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
             shaft->run_on = held_as_asked(run, p, shaft->doubted_steps);
             shaft->act = (uint16_t)HELD_TURN_BACK;
@@ -244,8 +244,7 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         drive_update_model(run, p, run->control.reference_erpm, 0);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
         run->estimator.e_q_q28 = 0;
-        emf.d = 0;
-        emf.q = 0;
+        emf = (dq_t){ 0, 0 };
     }
     shaft->stood = (shaft->stood == 0u) ? 1u : shaft->stood;
     shaft->emf_q12 = emf;

@@ -58,8 +58,7 @@ void held_forget(held_t *shaft);
 /** The speed whose field weakening is used: a rotor below half of the reference needs that of twice its speed, or none. Both are not negative. */
 speed_erpm_t held_weakened_for(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t speed);
 
-/** By how far the frame is ahead of a rotor that stopped at once: the back-EMF's filter, y += K (x - y), went on turning it by w/K periods' turns, w the
- *  speed that is in the filter alone. After held_t has its inv_kfi. @param lag_q12 see held_t @return angle counts, half a turn at most */
+/** Angle counts by which the filter y += K (x - y) turned the frame on from a rotor that stopped at once: w/K periods' turns, w of lag_q12 by held_t's inv_kfi. Half a turn at most. */
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12);
 
 /** A step, slots 5 and 13 in closed loop. */

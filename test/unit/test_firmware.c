@@ -186,6 +186,19 @@ static uint16_t crystal_fails(int calls)
     return 0;
 }
 
+void test_a_fault_that_is_there_is_not_raised_again_for_the_code_that_raises_may_be_damaged(void)
+{
+    board_drive.fault = (uint16_t)FAULT_TRAP;
+    board_drive.command.run = 1; /* what raising would write */
+    firmware_trip(FAULT_SELFTEST);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_TRAP, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(1, board_drive.command.run);
+    board_drive.fault = (uint16_t)FAULT_NONE;
+    firmware_trip(FAULT_SELFTEST);
+    TEST_ASSERT_EQUAL_UINT16(FAULT_SELFTEST, board_drive.fault);
+    TEST_ASSERT_EQUAL_UINT16(0, board_drive.command.run);
+}
+
 void test_drive_is_initialised_before_the_control_interrupt_can_come_and_keeps_a_fault_of_the_start(void)
 {
     static const struct {
