@@ -96,8 +96,7 @@ static void held_turn_back(drive_t *d, const drive_params_t *p, int16_t lead)
     handover_preset(d, p, e->next);
 }
 
-/** How much a step says for a rotor that stands: it is slower than half of its reference, and R i may be all of the back-EMF. Once R is known it is
- *  a rotor without back-EMF. @param along observed speed @param least what counts as a stall, half of the reference */
+/** How much a step says for a rotor that stands: slower than half of its reference, and R i may be all of its back-EMF; or without one, once R is known. @param least that half */
 static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf, speed_erpm_t along, speed_erpm_t least)
 {
     const drive_run_t *run = &d->run;
@@ -244,7 +243,8 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
         drive_update_model(run, p, run->control.reference_erpm, 0);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
         run->estimator.e_q_q28 = 0;
-        emf = (dq_t){ 0, 0 };
+        emf.d = 0;
+        emf.q = 0;
     }
     shaft->stood = (shaft->stood == 0u) ? 1u : shaft->stood;
     shaft->emf_q12 = emf;
