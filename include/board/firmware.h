@@ -37,7 +37,7 @@ extern volatile uint16_t board_clock_failed;
  *  A clock that does not come up, or fails later, raises FAULT_CLOCK, which S2 cannot clear; the outputs stay off. */
 void firmware_init(void) FIRMWARE_CALLED;
 
-/** Outputs off and the fault raised, from anywhere but the control interrupt. */
+/** Outputs off and the fault raised, from anywhere but the control interrupt. The first fault stays, and none is raised after it. */
 void firmware_trip(drive_fault_t fault) FIRMWARE_CALLED;
 
 #if HEAT_USED
