@@ -72,7 +72,7 @@ QM_INLINE void scope_fill(scope_t *s, int16_t *following, uint16_t is_rare)
 }
 
 /** Words of any number. @return where the next row goes */
-QM_INLINE int16_t *copy_words(const scope_t *s)
+static NOINLINE int16_t *copy_words(const scope_t *s)
 {
     const volatile int16_t *const volatile *source = s->source;
     int16_t *at = s->at;

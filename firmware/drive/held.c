@@ -6,9 +6,9 @@
 #include "drive/protection.h"
 #include "drive/speed.h"
 
-#define HELD_QUARTER 16384                           /* of a turn, angle counts */
-#define HELD_PERIOD_MOST (DEFER_DUTIES ? 512 : 1024) /* a quarter turn a step, of a period, high word */
-#define HELD_PERIOD_SHIFT (DEFER_DUTIES ? 11 : 12)   /* from a period's turn, Q32, to a step's, angle counts */
+#define HELD_NOTHING ((dq_t){ 0, 0 })
+#define HELD_QUARTER 16384                         /* of a turn, angle counts */
+#define HELD_PERIOD_SHIFT (DEFER_DUTIES ? 11 : 12) /* from a period's turn, Q32, to a step's, angle counts */
 
 /** The one place that writes the phase. */
 static NOINLINE void held_enter(held_t *shaft, held_phase_t next)
@@ -30,28 +30,28 @@ uint16_t held_angle_stands(const held_t *shaft)
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
-/** How far the back-EMF has moved: the sum of both parts' sizes. */
+/** A product's low part, once for all of this: it is long. */
+static NOINLINE int16_t held_within(int32_t value, int16_t least, int16_t most)
+{
+    return qm_within(value, least, most);
+}
+
+/** A back-EMF's sum over so many steps. */
+static NOINLINE int16_t held_times(int16_t emf_q12, uint16_t steps)
+{
+    return held_within(qm_mulsu(emf_q12, steps), -16383, 16383);
+}
+
+/** How far the back-EMF has moved: the sum of both parts' sizes. From nothing: how large it is. */
 static NOINLINE uint16_t held_moved(dq_t emf, dq_t from)
 {
     return (uint16_t)((uint16_t)qm_abs(qm_less(emf.d, from.d)) + (uint16_t)qm_abs(qm_less(emf.q, from.q)));
-}
-
-/** And how large it is. */
-static NOINLINE uint16_t held_size(dq_t emf)
-{
-    return held_moved(emf, (dq_t){ 0, 0 });
 }
 
 /** What the estimator makes of a sum of back-EMFs, with 1/Kphi and its limit from before the angle stopped: the model's may have moved since. */
 static NOINLINE speed_erpm_t held_omega(const drive_run_t *run, int16_t sum_q12)
 {
     return estimator_omega(sum_q12, run->held.emf_sum_max_q12, run->held.inv_kfi);
-}
-
-/** The sum that the estimator takes of a back-EMF. It fits a word, for the vector's length does. */
-static int16_t held_sum(int16_t sign, dq_t emf)
-{
-    return (int16_t)(emf.q - sign * emf.d);
 }
 
 speed_erpm_t held_weakened_for(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t speed)
@@ -63,18 +63,10 @@ speed_erpm_t held_weakened_for(const drive_params_t *p, speed_erpm_t reference, 
     return (int16_t)((speed > from >> 1) ? 2 * speed : from);
 }
 
-/** The angle that a speed turns in so many steps, a quarter turn at most. */
-static int16_t held_turned(const drive_params_t *p, speed_erpm_t omega_erpm, uint16_t steps)
+/** The angle that a sum of back-EMFs is, a step each: flux times it, and a quarter turn at most. */
+static NOINLINE int16_t held_turned(const drive_run_t *run, const drive_params_t *p, int16_t sum_q12)
 {
-    const int32_t period_q32 = qm_clamp_hi(qm_mulss(omega_erpm, p->estimator.deltat_q32), (int16_t)-HELD_PERIOD_MOST,
-                                           HELD_PERIOD_MOST); /* a quarter turn in a step */
-    return qm_within(qm_mulsu((int16_t)(period_q32 >> HELD_PERIOD_SHIFT), steps), -HELD_QUARTER, HELD_QUARTER);
-}
-
-/** What a rotor has turned by in so many steps that is as fast as the back-EMF said when it was asked. */
-static NOINLINE int16_t held_as_asked(const drive_run_t *run, const drive_params_t *p, uint16_t steps)
-{
-    return held_turned(p, held_omega(run, held_sum(run->estimator.sign, run->held.emf_q12)), steps);
+    return held_within(qm_mulss(held_omega(run, sum_q12), p->estimator.deltat_q32) >> HELD_PERIOD_SHIFT, -HELD_QUARTER, HELD_QUARTER);
 }
 
 int16_t held_lead(const drive_run_t *run, const drive_params_t *p, int16_t lag_q12)
@@ -102,7 +94,7 @@ static uint16_t held_doubts(const drive_t *d, const drive_params_t *p, dq_t emf,
     const drive_run_t *run = &d->run;
     if (run->held.stood) {
         const uint16_t off = (uint16_t)((run->held.steps < HELD_SLOW_STEPS) ? 0 : model_header_ri(p, qm_abs(run->control.i_q13.q)) >> HELD_R_SHIFT);
-        return (uint16_t)((held_size(emf) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
+        return (uint16_t)((held_moved(emf, HELD_NOTHING) <= (uint16_t)p->adaptation.emf_least_q12 + off) ? HELD_DOUBTS_FAR : 0u);
     }
     if (along >= least || run->handover.phase != (uint16_t)START_DONE || mode_commands_current(d) || !protection_rotor_is_doubtful(run, p)) {
         return 0;
@@ -136,23 +128,21 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->patience = (uint16_t)((d_current_goes || qm_beyond(lead, HELD_FAR_LEAD)) ? 2u * HELD_PATIENCE_STEPS : HELD_PATIENCE_STEPS);
     held_turn_back(d, p, held_clear_of_zero(d, lead));
     held_enter(shaft, HELD_SETTLES);
+    shaft->lag_q12 = emf.q;
+    shaft->turned_q12 = 0;
+    shaft->came_q12 = 0;
+    shaft->run_on = 0;
     d->run.model.inv_kfi = 0;
     d->run.observer.omega_q16 = 0;
     d->run.estimator.omega_filtered_q16 = 0;
-}
-
-/** A back-EMF's part along an axis that is so far ahead of the q axis: all of its length, where it points there. */
-static int16_t held_along(dq_t emf, angle_t ahead)
-{
-    const alphabeta_t standing = { emf.d, emf.q };
-    return (int16_t)(2 * park(standing, trig_sincos(ahead)).q);
 }
 
 /** The frame turns to where a back-EMF says that the rotor is: by its direction, and by what the filter is behind. @return its length, with its sign */
 static int16_t held_turn_to(drive_t *d, const drive_params_t *p, dq_t emf, int16_t sign)
 {
     const angle_t ahead = trig_direction((int16_t)(sign * emf.q), (int16_t)(-sign * emf.d));
-    const int16_t length = held_along(emf, ahead);
+    const alphabeta_t standing = { emf.d, emf.q };
+    const int16_t length = (int16_t)(2 * park(standing, trig_sincos(ahead)).q);                             /* its part along itself */
     held_turn_back(d, p, (int16_t)(uint16_t) ~(uint16_t)(ahead + (uint16_t)held_lead(&d->run, p, length))); /* to a count */
     d->run.estimator.e_d_q28 = 0;
     d->run.estimator.e_q_q28 = (int32_t)length * 65536;
@@ -171,13 +161,13 @@ static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t s
             run->observer.load_q16 = (int32_t)shaft->load * 65536;
         }
         shaft->stood = 2;
-        held_turn_back(d, p, (int16_t)-held_turned(p, held_omega(run, shaft->turned_q12), 1));
+        held_turn_back(d, p, (int16_t)-held_turned(run, p, shaft->turned_q12));
     } else {
         emf.q = held_turn_to(d, p, emf, sign);
         emf.d = 0;
     }
-    omega_erpm = held_omega(run, held_sum(sign, emf));
-    run->estimator.sign = sign; /* while the angle stood it had none */
+    omega_erpm = held_omega(run, (int16_t)(emf.q - sign * emf.d)); /* it fits a word, for the vector's length does */
+    run->estimator.sign = sign;                                    /* while the angle stood it had none */
     run->estimator.omega_filtered_q16 = (int32_t)omega_erpm * 65536;
     run->model.inv_kfi = shaft->inv_kfi;
     held_enter(shaft, HELD_TURNS);
@@ -207,19 +197,19 @@ static uint16_t held_is_ahead(const drive_t *d, dq_t emf, int16_t least_q12)
 static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
 {
     held_t *shaft = &d->run.held;
-    const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1;                                              /* dead time shakes it by as much */
-    const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps); /* since what it is compared with */
-    const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_as_asked(&d->run, p, steps))));                  /* of a rotor's d part as fast as asked: pi, nearly */
+    const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1;                                                         /* dead time shakes it by as much */
+    const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps);            /* since what it is compared with */
+    const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_turned(&d->run, p, held_times(shaft->emf_q12.q, steps))))); /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
-    const int16_t before = qm_clamp(shaft->emf_q12.d, INT16_MIN, 0); /* what falls to 0 is the filter's tail */
-    const int16_t turned = qm_less(before, emf.d);                   /* -E sin: negative to either side, with E's sign that of the speed */
-    const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : least) && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
+    const int16_t turned = qm_less(qm_clamp(shaft->emf_q12.d, INT16_MIN, 0), emf.d); /* -E sin: negative to either side, with E's sign that of the speed; what falls to 0 is the filter's tail */
+    const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : most) && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
     if (turns || moved > 2u * most || along_direction(d, shaft->turned_q12) > p->adaptation.turned_q12) {
         shaft->act = (uint16_t)(held_has_turned(d, (uint16_t)(turns && tells)) ? HELD_HAS_TURNED : HELD_GOES_ON);
     } else if (shaft->steps >= HELD_ASK_MOST_STEPS || ((tells || along_direction(d, shaft->emf_q12.q) < 0) && steps >= HELD_ASK_STEPS)) {
         shaft->act = (uint16_t)HELD_LEARN;
-    } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* the filter's tail is over */
-        shaft->emf_q12 = emf;
+    } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* a mean, for one step's noise would add up */
+        shaft->emf_q12.d = emf.d;
+        shaft->emf_q12.q = (int16_t)(shaft->emf_q12.q + (shaft->turned_q12 >> HELD_MEAN_SHIFT));
         shaft->turned_q12 = 0;
     } else { /* it may turn slowly */
     }
@@ -235,25 +225,25 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
     held_enter(shaft, HELD_STANDS);
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
         const int16_t part = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767, share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-part : part;
-        if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
-            shaft->run_on = held_as_asked(run, p, shaft->doubted_steps);
-            shaft->act = (uint16_t)HELD_TURN_BACK;
-        }
-        run->adaptation.rs_q31 = (int32_t)qm_within((int32_t)qm_hi(run->adaptation.rs_q31) + share, p->adaptation.rs_least, p->adaptation.rs_most) * 65536;
+        shaft->came_q12 = qm_less(shaft->came_q12, held_times(shaft->emf_q12.q, shaft->doubted_steps)); /* R i did not come */
+        run->adaptation.rs_q31 = (int32_t)held_within((int32_t)qm_hi(run->adaptation.rs_q31) + share, p->adaptation.rs_least, p->adaptation.rs_most) * 65536;
         drive_update_model(run, p, run->control.reference_erpm, 0);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
         run->estimator.e_q_q28 = 0;
         emf.d = 0;
         emf.q = 0;
     }
-    shaft->stood = (shaft->stood == 0u) ? 1u : shaft->stood;
+    if (shaft->stood == 0u) { /* the frame in the next such slot: both at once would be the longest slow work */
+        shaft->stood = 1;
+        shaft->act = (uint16_t)HELD_TURN_BACK;
+    }
     shaft->emf_q12 = emf;
 }
 
 /** What a filter of the back-EMF is behind: what the voltage has changed by, less what the estimator took back by itself through Ed. */
 static void held_follow_lag(held_t *shaft, const drive_run_t *run, dq_t emf)
 {
-    const int16_t taken_back = qm_within(qm_mulss((int16_t)(run->estimator.sign * emf.d), run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT, -16383, 16383);
+    const int16_t taken_back = held_within(qm_mulss((int16_t)(run->estimator.sign * emf.d), run->model.kfilter_esdq_q16) >> HELD_PERIOD_SHIFT, -16383, 16383);
     const int16_t lag = shaft->lag_q12, old = (int16_t)(lag >> HELD_LAG_SHIFT), left = (int16_t)(uint16_t)((uint16_t)emf.q - (uint16_t)old);
     const uint16_t at_once = (uint16_t)(shaft->doubted_steps != 0u || ((left ^ lag) < 0 && (run->estimator.sign ^ lag) >= 0)); /* the filter alone has a back-EMF: all counts */
     shaft->lag_q12 = qm_less(at_once ? lag : (int16_t)(uint16_t)((uint16_t)lag - (uint16_t)old), qm_less(taken_back, (int16_t)(uint16_t)((uint16_t)shaft->emf_q12.q - (uint16_t)emf.q)));
@@ -289,8 +279,7 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
     held_t *shaft = &d->run.held;
     if (shaft->act == (uint16_t)HELD_WAITS) { /* else the frame is turned back first */
         if (moved > (uint16_t)p->adaptation.emf_least_q12 && shaft->steps > HELD_REST_STEPS) {
-            const uint16_t grows = (uint16_t)(along_direction(d, emf.q) < 0 && shaft->steps > HELD_REST_STEPS + HELD_ASK_STEPS);
-            shaft->act = (uint16_t)(grows ? HELD_LEARN : HELD_GOES_ON); /* the current grows, and R is less than was learnt */
+            shaft->act = (uint16_t)((along_direction(d, emf.q) < 0 && shaft->steps > HELD_REST_STEPS + HELD_ASK_STEPS) ? HELD_LEARN : HELD_GOES_ON); /* the current grows, and R is less than was learnt */
             shaft->emf_q12 = emf;
             return;
         }
@@ -306,12 +295,14 @@ static void held_push(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t mo
 /** Has the rotor turned all the time? A back-EMF that does not come to stand says so, and one that grows at once. One that shrinks is of a rotor that comes to its stop. */
 static void held_settle(held_t *shaft, dq_t emf, uint16_t moved, uint16_t least_q12)
 {
-    const uint16_t size = held_size(emf), before = held_size(shaft->emf_q12), patient = (uint16_t)(shaft->steps <= HELD_PATIENCE_STEPS);
+    const uint16_t size = held_moved(emf, HELD_NOTHING), before = held_moved(shaft->emf_q12, HELD_NOTHING), patient = (uint16_t)(shaft->steps <= HELD_PATIENCE_STEPS);
     if (moved > least_q12 >> 1 || shaft->steps < HELD_SETTLE_STEPS) { /* the current changes, or it turns */
         if (size + (moved >> 1) >= before && size > 2u * least_q12 && (shaft->steps > shaft->patience || (size > before + least_q12 && !patient))) {
             shaft->act = (uint16_t)HELD_HAS_TURNED;
         }
     } else {
+        shaft->lag_q12 = (int16_t)(uint16_t)((uint16_t)shaft->lag_q12 - (uint16_t)emf.q);
+        shaft->came_q12 = qm_less(shaft->came_q12, qm_less(qm_less(held_times(emf.q, shaft->steps), (int16_t)(shaft->lag_q12 >> 1)), shaft->turned_q12));
         shaft->turned_q12 = 0;
         shaft->doubted_steps = (uint16_t)(patient ? shaft->doubted_steps + 1u : 0u); /* it stood, or came to its stop since */
         held_enter(shaft, HELD_ASKED);
@@ -324,14 +315,17 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
 {
     held_t *shaft = &d->run.held;
     const uint16_t moved = held_moved(emf, shaft->emf_q12), most = (uint16_t)p->adaptation.emf_least_q12;
-    shaft->turned_q12 = qm_less(shaft->turned_q12, qm_less(shaft->emf_q12.q, emf.q));
+    shaft->turned_q12 = qm_less(shaft->turned_q12, qm_less((shaft->phase == (uint16_t)HELD_SETTLES) ? 0 : shaft->emf_q12.q, emf.q));
     if (held_is_ahead(d, emf, (int16_t)most)) {
         shaft->act = (uint16_t)HELD_HAS_TURNED;
         return;
     }
     switch (shaft->phase) {
     case HELD_SETTLES: held_settle(shaft, emf, moved, most); break;
-    case HELD_ASKED: held_compare(d, p, emf, moved); break;
+    case HELD_ASKED:
+        shaft->turned_q12 = (shaft->steps == HELD_ASK_STEPS) ? 0 : shaft->turned_q12; /* the filter's tail is over */
+        held_compare(d, p, emf, moved);
+        break;
     default: held_push(d, p, emf, moved); break; /* HELD_STANDS */
     }
 }
@@ -373,7 +367,11 @@ NOINLINE void held_act(drive_t *d, const drive_params_t *p)
             held_enter(shaft, HELD_SETTLES);
         }
         break;
-    case HELD_TURN_BACK: held_turn_back(d, p, shaft->run_on); break;
+    case HELD_TURN_BACK:
+        held_turn_back(d, p, (int16_t)(uint16_t)((uint16_t)shaft->run_on + (uint16_t)held_lead(&d->run, p, shaft->lag_q12) - (uint16_t)held_turned(&d->run, p, shaft->came_q12)));
+        shaft->lag_q12 = 0;
+        shaft->came_q12 = 0;
+        break;
     default: break; /* HELD_WAITS */
     }
 }

@@ -3,8 +3,7 @@
  * The estimator cannot see a rotor that stands: R i and a back-EMF look alike. Its angle runs away, and a shaft that is let go is thrown wherever the
  * angle has come to. So where the rotor may stand, the angle stands, too, and the current with it. A back-EMF that stands still is R i alone: it tells R,
  * and how far the angle had run. One that turns or changes is a rotor that turns: where it has turned all the time, its direction in the frame that
- * stands says where the rotor is, and the estimator goes on from there. The less back-EMF there is, the longer the question takes: dead time must not
- * hide the turn. A rotor that stands for PARAM_STALL_SEC is a stall as ever. */
+ * stands says where the rotor is, and the estimator goes on from there. The less of it there is, the longer the question takes: dead time must not hide it. */
 #ifndef DRIVE_HELD_H
 #define DRIVE_HELD_H
 
@@ -26,7 +25,7 @@ enum {
     HELD_STOP,       /**< the angle stops */
     HELD_HAS_TURNED, /**< the rotor has turned all the time */
     HELD_LEARN,      /**< the rotor stands: all of the back-EMF is R i */
-    HELD_TURN_BACK,  /**< the frame turns back by what R i had turned it */
+    HELD_TURN_BACK,  /**< the frame turns back by what R i had turned it, and on by what the rotor came */
     HELD_GOES_ON     /**< it stood, and turns now */
 };
 
@@ -37,15 +36,16 @@ typedef struct {
     uint16_t steps;          /**< in the phase */
     uint16_t doubts;         /**< steps that look like a held rotor; a rotor far below its reference counts three */
     uint16_t doubted_steps;  /**< since then; from HELD_ASKED on those that R i had turned the frame in */
-    int16_t turned_q12;      /**< from HELD_ASKED on the sum of what the back-EMF's q part gained, a step each: flux times the angle turned */
+    int16_t turned_q12;      /**< from HELD_ASKED on the sum of what the back-EMF's q part gained, a step each: flux times the angle turned; before, of all of it */
+    int16_t came_q12;        /**< that sum until it was asked, less that of R i: what it turned by that came to its stop, and what the filter was behind */
     uint16_t patience;       /**< steps that the back-EMF has to settle */
     uint16_t stood;          /**< since the rotor was as fast as it should be: 1 it has stood, so R is known; 2 and has turned again */
     dq_t emf_q12;            /**< filtered back-EMF of the last step; of an older one from HELD_ASKED on */
-    int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind */
+    int16_t lag_q12;         /**< back-EMF that is in the filter alone: how far it is behind; that which was when the angle stopped */
     int16_t inv_kfi;         /**< of the model when the angle stopped */
     int16_t emf_sum_max_q12; /**< and its limit of the sum of back-EMFs */
     int16_t load;            /**< the load before all that, in units of the load observer: high word of its load_q16 */
-    int16_t run_on;          /**< by how much R i had turned the frame, angle counts */
+    int16_t run_on;          /**< by how much the frame turns back next, besides, angle counts */
     angle_t went;            /**< the frame's angle when the speed was last above three quarters of the reference */
 } held_t;
 

@@ -393,6 +393,7 @@ void test_a_rotor_that_came_to_its_stop_while_the_angle_stood_was_no_frame_that_
             int16_t back;
             asked(direction, 400);
             shaft->emf_q12.q = (int16_t)(direction * (400 + falls * falls_q12));
+            shaft->lag_q12 = shaft->emf_q12.q;
             stopped = estimator_next_angle(&drive.run.estimator);
             for (uint16_t n = falls; n-- != 0u;) {
                 rig_emf(0, (int16_t)(direction * (400 + n * falls_q12)));
@@ -402,8 +403,41 @@ void test_a_rotor_that_came_to_its_stop_while_the_angle_stood_was_no_frame_that_
             (void)answered();
             steps(1);
             back = (int16_t)(direction * (int16_t)(angle_t)(stopped - estimator_next_angle(&drive.run.estimator)));
+            back = (int16_t)(back + angle_of((int32_t)falls * falls * falls_q12 / 2) - (int16_t)behind((float)(falls * falls_q12))); /* it came so far, and that puts the frame right */
             TEST_ASSERT_INT16_WITHIN(50, (falls < HELD_PATIENCE_STEPS) ? angle_of(3 * 400) : 0, back);
         }
+    }
+}
+
+/** A rotor that stops at once, and one that comes to its stop: the back-EMF falls as the filter does, or by so much a step. @return the frame's turn along the direction */
+static int16_t comes_to_its_stop(int16_t direction, int16_t from_q12, int16_t falls_q12)
+{
+    float stays, emf_q12 = (float)from_q12;
+    angle_t stopped;
+    asked(direction, from_q12);
+    stays = 1.0F - (float)drive.run.model.kfilter_esdq_q16 / 65536.0F;
+    for (uint16_t n = 0; n < 4u; n++) {
+        stays *= stays; /* of 16 periods */
+    }
+    stopped = estimator_next_angle(&drive.run.estimator);
+    while (shaft->phase != (uint16_t)HELD_STANDS) {
+        emf_q12 = (falls_q12 == 0) ? emf_q12 * stays : (emf_q12 > (float)falls_q12) ? emf_q12 - (float)falls_q12 : 0.0F;
+        rig_emf(0, (int16_t)((float)direction * (emf_q12 + 0.5F)));
+        steps(1);
+    }
+    steps(1);
+    return (int16_t)(direction * (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped));
+}
+
+void test_the_frame_goes_on_by_what_a_rotor_turned_that_came_to_its_stop_and_not_where_the_filter_alone_had_a_back_emf(void)
+{
+    EACH_DIRECTION(direction) {
+        const int16_t at_once = comes_to_its_stop(direction, 600, 0), in_eight = comes_to_its_stop(direction, 600, 75);
+        const int16_t came = angle_of(8 * 600 / 2), rest = angle_of(3 * params.adaptation.emf_least_q12); /* the tail's rest is taken for R i */
+        TEST_ASSERT_INT16_WITHIN(rest, 0, at_once);
+        TEST_ASSERT_INT16_WITHIN(rest, (int16_t)(came - (int16_t)behind(600.0F)), in_eight);
+        TEST_ASSERT_EQUAL_INT16(0, shaft->came_q12);
+        TEST_ASSERT_EQUAL_INT16(0, shaft->lag_q12);
     }
 }
 
@@ -692,12 +726,11 @@ void test_a_back_emf_that_turns_as_a_rotor_would_lets_the_estimator_go_on_where_
 
 void test_a_back_emf_that_turns_by_less_than_half_of_what_it_says_or_by_what_dead_time_does_is_one_that_stands(void)
 {
-    const int16_t least = (int16_t)(params.adaptation.emf_least_q12 / 2);
     static const int16_t emf_q12[] = { 280, 40 }; /* half of its turn in three steps is more than dead time's, and less */
     EACH(n, emf_q12) {
         const int16_t half = (int16_t)(3.14F * (float)emf_q12[n] * 3.0F * 16.0F * (float)emf_q12[n] * (float)drive.run.model.inv_kfi / 2048.0F / 60.0F
                                        * PARAM_F(LOOPTIME_SEC));
-        const int16_t most = (half > least) ? half : least;
+        const int16_t most = (n == 0u) ? half : params.adaptation.emf_least_q12;
         asked(1, emf_q12[n]);
         steps((uint16_t)(HELD_SETTLE_STEPS + 2u + ((n == 0u) ? 0u : 2u * HELD_ASK_STEPS))); /* settled, and two steps asked; of little after the filter's tail */
         rig_emf((int16_t)(-most + 8), emf_q12[n]);
@@ -725,9 +758,26 @@ void test_a_back_emf_whose_turn_dead_time_would_hide_is_asked_for_longer(void)
     }
 }
 
+void test_the_noise_of_one_step_does_not_add_up_to_a_turn_in_a_long_question(void)
+{
+    const int16_t dip_q12 = (int16_t)(params.adaptation.turned_q12 / (int16_t)(HELD_ASK_MOST_STEPS - 2u * HELD_ASK_STEPS) + 2); /* so far below the rest, each would count */
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASK_STEPS, 1u << HELD_MEAN_SHIFT);
+    EACH_DIRECTION(direction) {
+        for (uint16_t step = HELD_SETTLE_STEPS; step < HELD_SETTLE_STEPS + HELD_ASK_MOST_STEPS; step++) {
+            asked(direction, 60);
+            steps((uint16_t)(step - 1u));
+            rig_emf(0, (int16_t)(direction * (60 - dip_q12)));
+            steps(1);
+            rig_emf(0, (int16_t)(direction * 60));
+            TEST_ASSERT_EQUAL_UINT16(HELD_SETTLE_STEPS + HELD_ASK_MOST_STEPS - step, answered());
+            TEST_ASSERT_EQUAL_UINT16(1, shaft->stood);
+        }
+    }
+}
+
 void test_a_back_emf_that_turns_backwards_is_no_rotor_that_turns_forwards(void)
 {
-    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8); /* than dead time shakes it by */
+    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 + 8); /* than dead time shakes it by */
     EACH_DIRECTION(direction) {
         asked(direction, 40);
         steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS + 2u);
@@ -926,10 +976,10 @@ void test_a_rotor_that_speeds_up_in_a_long_question_is_not_taken_for_one_that_st
 
 void test_the_first_steps_turn_right_after_a_question_began_anew_may_be_dead_time_s(void)
 {
-    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8);
-    asked(1, 20);
+    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 + 8);
+    asked(1, (int16_t)(more + 8)); /* else it would be one that is ahead */
     steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS);
-    rig_emf((int16_t)-more, 20);
+    rig_emf((int16_t)-more, (int16_t)(more + 8));
     steps(HELD_ASK_STEPS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
     steps(1);
@@ -1011,11 +1061,11 @@ void test_a_back_emf_that_is_small_says_nothing_of_a_rotor_that_turns_on(void)
 
 void test_late_in_a_question_only_a_back_emf_that_turned_by_what_it_said_had_turned_all_the_time(void)
 {
-    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 / 2 + 8); /* than dead time shakes it by */
+    const int16_t more = (int16_t)(params.adaptation.emf_least_q12 + 8); /* than dead time shakes it by */
     uint16_t count;
-    asked(1, 40); /* too little to tell: it turns, or was let go */
+    asked(1, (int16_t)(more + 8)); /* too little to tell: it turns, or was let go */
     steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS);
-    rig_emf((int16_t)-more, 40);
+    rig_emf((int16_t)-more, (int16_t)(more + 8));
     steps(HELD_ASK_STEPS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
     steps(1);
