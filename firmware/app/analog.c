@@ -1,8 +1,7 @@
 /* Application: a signal of 0..10 V on the potentiometer's input runs the motor. Above ANALOG_START it turns, MINIMUM_SPEED_RPM to MAXIMUM_SPEED_RPM;
  * below ANALOG_STOP it stops. A signal below ANALOG_STOP for ANALOG_CLEAR_MS clears a fault. The board needs a divider from 10 V to 3.3 V.
  *
- * 2..10 V and 4..20 mA, as 0.55..2.75 V at the pin: POT_LIVE_ZERO 0.167 in userparams.h; a broken wire is then the fault POTENTIOMETER. At 0..10 V it is a
- * signal of 0: the motor stops. */
+ * 2..10 V and 4..20 mA, as 0.55..2.75 V at the pin: POT_LIVE_ZERO 0.167 in userparams.h; a broken wire is then the fault POTENTIOMETER. At 0..10 V the motor stops. */
 #include "app/app.h"
 
 #define ANALOG_STOP APP_SHARE(0.05)

@@ -118,8 +118,7 @@ static void test_registers(void)
     }
 }
 
-/** The override as the interrupts' last words have left it: as the state asks (drive_outputs()), or off. The low sides stay on until the first duties
- *  are written. */
+/** The override as the interrupts' last words have left it: as the state asks (drive_outputs()), or off; low sides on until the first duties. */
 static void test_outputs(void)
 {
     const uint16_t now = P1OVDCON, state = board_drive.state;
@@ -312,8 +311,7 @@ char *selftest_put_marked(char *at)
 
 /* ---- Self-tests at a start: the watchdog and with it the clock (by a reset, at power-up), processor, flash, all of the RAM, stack ---- */
 
-/* The watchdog's time in counts of timer 1 at 64 cycles: 10000 for 512 periods of 32 kHz. An oscillator that is 30 % off passes [?], a clock of twice or
- * half its frequency does not. */
+/* The watchdog's time in counts of timer 1 at 64 cycles: 10000 for 512 periods of 32 kHz. An oscillator 30 % off passes [?], one of twice or half does not. */
 #define WATCHDOG_LEAST 7500u
 #define WATCHDOG_MOST 14500u
 #define WATCHDOG_NEVER 20000u

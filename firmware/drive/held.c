@@ -54,6 +54,12 @@ static NOINLINE speed_erpm_t held_omega(const drive_run_t *run, int16_t sum_q12)
     return estimator_omega(sum_q12, run->held.emf_sum_max_q12, run->held.inv_kfi);
 }
 
+/** The sum that the estimator takes of a back-EMF. It fits a word, for the vector's length does. */
+static int16_t held_sum(int16_t sign, dq_t emf)
+{
+    return (int16_t)(emf.q - sign * emf.d);
+}
+
 speed_erpm_t held_weakened_for(const drive_params_t *p, speed_erpm_t reference, speed_erpm_t speed)
 {
     const speed_erpm_t from = p->fieldweak.on_speed_erpm;
@@ -137,12 +143,18 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p, dq_t emf)
     d->run.estimator.omega_filtered_q16 = 0;
 }
 
+/** A back-EMF's part along an axis that is so far ahead of the q axis: all of its length, where it points there. */
+static int16_t held_along(dq_t emf, angle_t ahead)
+{
+    const alphabeta_t standing = { emf.d, emf.q };
+    return (int16_t)(2 * park(standing, trig_sincos(ahead)).q);
+}
+
 /** The frame turns to where a back-EMF says that the rotor is: by its direction, and by what the filter is behind. @return its length, with its sign */
 static int16_t held_turn_to(drive_t *d, const drive_params_t *p, dq_t emf, int16_t sign)
 {
     const angle_t ahead = trig_direction((int16_t)(sign * emf.q), (int16_t)(-sign * emf.d));
-    const alphabeta_t standing = { emf.d, emf.q };
-    const int16_t length = (int16_t)(2 * park(standing, trig_sincos(ahead)).q);                             /* its part along itself */
+    const int16_t length = held_along(emf, ahead);
     held_turn_back(d, p, (int16_t)(uint16_t) ~(uint16_t)(ahead + (uint16_t)held_lead(&d->run, p, length))); /* to a count */
     d->run.estimator.e_d_q28 = 0;
     d->run.estimator.e_q_q28 = (int32_t)length * 65536;
@@ -166,8 +178,8 @@ static void held_go_on(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t s
         emf.q = held_turn_to(d, p, emf, sign);
         emf.d = 0;
     }
-    omega_erpm = held_omega(run, (int16_t)(emf.q - sign * emf.d)); /* it fits a word, for the vector's length does */
-    run->estimator.sign = sign;                                    /* while the angle stood it had none */
+    omega_erpm = held_omega(run, held_sum(sign, emf));
+    run->estimator.sign = sign; /* while the angle stood it had none */
     run->estimator.omega_filtered_q16 = (int32_t)omega_erpm * 65536;
     run->model.inv_kfi = shaft->inv_kfi;
     held_enter(shaft, HELD_TURNS);
@@ -207,10 +219,8 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
         shaft->act = (uint16_t)(held_has_turned(d, (uint16_t)(turns && tells)) ? HELD_HAS_TURNED : HELD_GOES_ON);
     } else if (shaft->steps >= HELD_ASK_MOST_STEPS || ((tells || along_direction(d, shaft->emf_q12.q) < 0) && steps >= HELD_ASK_STEPS)) {
         shaft->act = (uint16_t)HELD_LEARN;
-    } else if (shaft->steps == 2u * HELD_ASK_STEPS) { /* a mean, for one step's noise would add up */
+    } else if (shaft->steps == 2u * HELD_ASK_STEPS) {
         shaft->emf_q12.d = emf.d;
-        shaft->emf_q12.q = (int16_t)(shaft->emf_q12.q + (shaft->turned_q12 >> HELD_MEAN_SHIFT));
-        shaft->turned_q12 = 0;
     } else { /* it may turn slowly */
     }
 }
@@ -301,7 +311,7 @@ static void held_settle(held_t *shaft, dq_t emf, uint16_t moved, uint16_t least_
             shaft->act = (uint16_t)HELD_HAS_TURNED;
         }
     } else {
-        shaft->lag_q12 = (int16_t)(uint16_t)((uint16_t)shaft->lag_q12 - (uint16_t)emf.q);
+        shaft->lag_q12 = qm_less(shaft->lag_q12, emf.q);
         shaft->came_q12 = qm_less(shaft->came_q12, qm_less(qm_less(held_times(emf.q, shaft->steps), (int16_t)(shaft->lag_q12 >> 1)), shaft->turned_q12));
         shaft->turned_q12 = 0;
         shaft->doubted_steps = (uint16_t)(patient ? shaft->doubted_steps + 1u : 0u); /* it stood, or came to its stop since */
@@ -323,7 +333,10 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     switch (shaft->phase) {
     case HELD_SETTLES: held_settle(shaft, emf, moved, most); break;
     case HELD_ASKED:
-        shaft->turned_q12 = (shaft->steps == HELD_ASK_STEPS) ? 0 : shaft->turned_q12; /* the filter's tail is over */
+        if (shaft->steps >= HELD_ASK_STEPS && shaft->steps <= 2u * HELD_ASK_STEPS) { /* the filter's tail is over: a mean, for one step's noise would add up */
+            shaft->emf_q12.q = qm_mean(shaft->emf_q12.q, emf.q);
+            shaft->turned_q12 = 0;
+        }
         held_compare(d, p, emf, moved);
         break;
     default: held_push(d, p, emf, moved); break; /* HELD_STANDS */

@@ -1,5 +1,4 @@
-/* Parameters that outlive a reset: two copies in the flash's last two pages, written only while the bridge is off (docs/kept.md).
- * Nothing where PARAMS_KEPT is 0. */
+/* Parameters that outlive a reset: two copies in the flash's last two pages, written only while the bridge is off (docs/kept.md). Nothing without PARAMS_KEPT. */
 #ifndef BOARD_KEPT_H
 #define BOARD_KEPT_H
 

@@ -2,8 +2,7 @@
 #ifndef BOARD_PIN_TABLE_H
 #define BOARD_PIN_TABLE_H
 
-/** X(number, port, bit, an, rp, cn, others): analogue input ANx, remappable RPx, change notice CNx with its pull-up; -1 for none. Pin diagram of the 44-pin
- *  TQFP and QFN. */
+/** X(number, port, bit, an, rp, cn, others): analogue input ANx, remappable RPx, change notice CNx with its pull-up; -1: none. 44-pin TQFP and QFN. */
 #define CHIP_PIN_TABLE(X) \
     X(1, B, 9, -1, 9, 21, "SDA1") \
     X(2, C, 6, -1, 22, 18, "") \

@@ -7,8 +7,7 @@
 #define FAULT_PASSES 1
 #define FAULT_STAYS 0
 
-/** X(code, name, passes, decided_by, cause, remedy). Codes never change their meaning; the LED blinks the code. The functions of decided_by name
- *  the fault in their bodies. */
+/** X(code, name, passes, decided_by, cause, remedy). Codes never change their meaning; the LED blinks the code. The bodies of decided_by's functions name it. */
 #define DRIVE_FAULT_TABLE(X) \
     X(0, NONE, FAULT_STAYS, "", \
       "no fault", "nothing to do") \

@@ -80,8 +80,7 @@ current_q13_t limits_derated(const drive_params_t *p, int16_t bus_q15);
 /** Narrows the q current's limit to what supply and bus allow, while the q current drives; braking has REGEN_LIMIT_V. After limits_current(). */
 void limits_driving(drive_t *d, const drive_params_t *p);
 
-/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: a filter's lag would let the bus
- *  capacitor and this limit swing */
+/** Largest braking current: falls to nothing over the 2 V above REGEN_LIMIT_V. @param bus_q15 of this moment: with a filter's lag the bus would swing */
 void limits_braking(drive_run_t *run, const drive_params_t *p, int16_t bus_q15);
 
 /** Limits braking current to what the bus absorbs. @param iq_q13 the speed controller's output @return the q current */

@@ -23,8 +23,7 @@ current_q13_t salient_torque(const drive_run_t *run, current_q13_t iq_q13);
 /** The q current for that torque. Both with 13 fraction bits. */
 int32_t salient_current_q26(const drive_run_t *run, int32_t torque_q26);
 
-/** q current that the torque takes while d current along the flux takes of it. @param id_q13 0 .. MAXIMUM_CURRENT_A, which is less than doubles the flux
- *  @return not negative */
+/** q current that the torque takes while d current along the flux takes of it. @param id_q13 0 .. MAXIMUM_CURRENT_A, less than doubles the flux @return not negative */
 uint16_t salient_current_beside(const drive_run_t *run, const drive_params_t *p, current_q13_t id_q13);
 
 /** d current of the least current, or field weakening's if that is more. Slots 2, 10 in closed loop. */

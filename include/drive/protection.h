@@ -23,8 +23,7 @@ uint16_t protection_flux_is_impossible(const drive_run_t *run, const drive_param
  *  resistance is too hot. Slot 14 in closed loop. */
 void protection_check_model(drive_t *d, const drive_params_t *p);
 
-/** 1 where a resistance within the header's tolerance and dead time would explain the whole back-EMF: the rotor may stand, for a voltage in phase
- *  with the current is both. */
+/** 1 where a resistance within the header's tolerance and dead time would explain the whole back-EMF: the rotor may stand. */
 uint16_t protection_rotor_is_doubtful(const drive_run_t *run, const drive_params_t *p);
 
 /** Speed along the direction below which the rotor counts as stalled: half the reference, or of a low one half the minimum speed. */

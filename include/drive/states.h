@@ -116,8 +116,7 @@ uint16_t drive_may_follow(uint16_t state, drive_state_t next);
  *  in the table is a fault of the program: SELFTEST, outputs off. */
 void drive_enter(drive_t *d, drive_state_t next);
 
-/** The last word of a period: a fault that a trap has raised in the middle of it outlives what the period has entered since.
- *  @return 1 when the outputs must be off */
+/** The last word of a period: a fault that a trap has raised in the middle of it outlives what it has entered since. @return 1: outputs off */
 uint16_t drive_latch_fault(drive_t *d);
 
 /** Stops at once and keeps the code of the first fault. Any context: background, interrupt, trap. */

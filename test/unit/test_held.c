@@ -761,7 +761,6 @@ void test_a_back_emf_whose_turn_dead_time_would_hide_is_asked_for_longer(void)
 void test_the_noise_of_one_step_does_not_add_up_to_a_turn_in_a_long_question(void)
 {
     const int16_t dip_q12 = (int16_t)(params.adaptation.turned_q12 / (int16_t)(HELD_ASK_MOST_STEPS - 2u * HELD_ASK_STEPS) + 2); /* so far below the rest, each would count */
-    TEST_ASSERT_EQUAL_UINT16(HELD_ASK_STEPS, 1u << HELD_MEAN_SHIFT);
     EACH_DIRECTION(direction) {
         for (uint16_t step = HELD_SETTLE_STEPS; step < HELD_SETTLE_STEPS + HELD_ASK_MOST_STEPS; step++) {
             asked(direction, 60);
@@ -1110,7 +1109,7 @@ void test_the_tail_of_the_filter_is_no_turn_of_a_rotor(void)
     rig_emf((int16_t)-gains_q12, (int16_t)(20 + gains_q12));
     steps(2u * HELD_ASK_STEPS - 1u);
     TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
-    TEST_ASSERT_EQUAL_INT16(20 + gains_q12, shaft->emf_q12.q);
+    TEST_ASSERT_INT16_WITHIN(1, 20 + gains_q12, shaft->emf_q12.q); /* rounded to a count each step */
     TEST_ASSERT_EQUAL_INT16(0, shaft->turned_q12);
     rig_emf((int16_t)(-2 * gains_q12 + 8), (int16_t)(20 + gains_q12));
     (void)answered();

@@ -498,8 +498,7 @@ static NOINLINE void mechanics_current(drive_t *d, current_q13_t iq_q13)
     id->follow_log2 = FOLLOW_LOG2;
 }
 
-/** What the samples of a stretch miss of the current at a speed / 16: they are taken after the centre of the low sides' conduction, when the
- *  back-EMF has taken some of it off. */
+/** What the samples of a stretch miss of the current at a speed / 16: after the low sides' centre the back-EMF has taken some of it off. */
 static NOINLINE int32_t missed(const identify_t *id, int32_t speed, soft_float_t factor)
 {
     return soft_float_times(speed, soft_float_mul(factor, soft_float_div(soft_float_of(id->values.kphi_uv_per_krpm), soft_float_of(id->values.lq_nh))));

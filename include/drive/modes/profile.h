@@ -74,8 +74,7 @@ typedef struct {
         .sum_most_q13 = (int16_t)(PARAM_F(PROFILE_SUM_SHARE) * PARAM_F(CURRENT_Q13(MAXIMUM_CURRENT_A))) \
     },
 
-/** The shaft's angle, some constant apart: counts the electrical turns. @param rho the estimator's angle @param speed its sign tells the direction
- *  @return 65536 = one turn of the shaft */
+/** The shaft's angle, some constant apart: counts the electrical turns. @param rho the estimator's angle @param speed its sign counts @return 65536 = a turn */
 angle_t profile_shaft(profile_t *f, const profile_params_t *p, angle_t rho, speed_erpm_t speed);
 
 /** How gain and lags follow the speed. */
