@@ -221,6 +221,8 @@ static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t
         shaft->act = (uint16_t)HELD_LEARN;
     } else if (shaft->steps == 2u * HELD_ASK_STEPS) {
         shaft->emf_q12.d = emf.d;
+        shaft->emf_q12.q = qm_less(shaft->emf_q12.q, (int16_t) - (shaft->turned_q12 >> HELD_MEAN_SHIFT)); /* a mean: one step's noise would add up */
+        shaft->turned_q12 = 0;
     } else { /* it may turn slowly */
     }
 }
@@ -235,7 +237,6 @@ static void held_learn(drive_t *d, const drive_params_t *p, dq_t emf)
     held_enter(shaft, HELD_STANDS);
     if (ri_q12 > (uint16_t)p->adaptation.emf_least_q12) {
         const int16_t part = (more_q12 < ri_q12) ? qm_share(more_q12, ri_q12) : 32767, share = ((iq_q13 ^ emf.q) < 0) ? (int16_t)-part : part;
-        shaft->came_q12 = qm_less(shaft->came_q12, held_times(shaft->emf_q12.q, shaft->doubted_steps)); /* R i did not come */
         run->adaptation.rs_q31 = (int32_t)held_within((int32_t)qm_hi(run->adaptation.rs_q31) + share, p->adaptation.rs_least, p->adaptation.rs_most) * 65536;
         drive_update_model(run, p, run->control.reference_erpm, 0);
         run->estimator.e_d_q28 = 0; /* the filter would take a while */
@@ -311,10 +312,10 @@ static void held_settle(held_t *shaft, dq_t emf, uint16_t moved, uint16_t least_
             shaft->act = (uint16_t)HELD_HAS_TURNED;
         }
     } else {
-        shaft->lag_q12 = qm_less(shaft->lag_q12, emf.q);
-        shaft->came_q12 = qm_less(shaft->came_q12, qm_less(qm_less(held_times(emf.q, shaft->steps), (int16_t)(shaft->lag_q12 >> 1)), shaft->turned_q12));
-        shaft->turned_q12 = 0;
         shaft->doubted_steps = (uint16_t)(patient ? shaft->doubted_steps + 1u : 0u); /* it stood, or came to its stop since */
+        shaft->lag_q12 = qm_less(shaft->lag_q12, emf.q);
+        shaft->came_q12 = qm_less(shaft->came_q12, qm_less(qm_less(held_times(emf.q, (uint16_t)(shaft->steps + shaft->doubted_steps)), (int16_t)(shaft->lag_q12 >> 1)), shaft->turned_q12)); /* R i did not come */
+        shaft->turned_q12 = 0;
         held_enter(shaft, HELD_ASKED);
     }
     shaft->emf_q12 = emf;
@@ -332,13 +333,7 @@ static NOINLINE void held_ask(drive_t *d, const drive_params_t *p, dq_t emf)
     }
     switch (shaft->phase) {
     case HELD_SETTLES: held_settle(shaft, emf, moved, most); break;
-    case HELD_ASKED:
-        if (shaft->steps >= HELD_ASK_STEPS && shaft->steps <= 2u * HELD_ASK_STEPS) { /* the filter's tail is over: a mean, for one step's noise would add up */
-            shaft->emf_q12.q = qm_mean(shaft->emf_q12.q, emf.q);
-            shaft->turned_q12 = 0;
-        }
-        held_compare(d, p, emf, moved);
-        break;
+    case HELD_ASKED: held_compare(d, p, emf, moved); break;
     default: held_push(d, p, emf, moved); break; /* HELD_STANDS */
     }
 }

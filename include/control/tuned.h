@@ -136,6 +136,7 @@
 #define HELD_PULL_STEPS 32u   /* [steps] 32 degrees, and back: a load may have stopped it so far ahead of the frame, or behind | loadsteps */
 #define HELD_REST_STEPS 2u    /* [steps] of 16 periods that a frame that was turned back takes to settle | loadsteps */
 #define HELD_ASK_STEPS 4u     /* [steps] of 16 periods in which a rotor's back-EMF would turn | held */
+#define HELD_MEAN_SHIFT 3      /* [shift] a long question compares with the mean of its first 2 HELD_ASK_STEPS | soak */
 #define HELD_ASK_MOST_STEPS 32u /* [steps] of 16 periods, for a back-EMF too small to tell sooner | lowspeed */
 #define HELD_SLOW_STEPS 64u    /* [steps] of 16 periods, in which the heaviest rotor that was let go is faster than what follows | held */
 #define HELD_R_SHIFT 5         /* [shift] after them: R that was learnt at standstill may be off by 1/32 | held */

@@ -44,7 +44,7 @@ static void any_held(held_t *h, held_phase_t phase)
     h->patience = ANYU16();
     h->stood = any_u(0, 2);
     h->emf_q12.d = any((int16_t)-emf_dq_max, emf_dq_max);
-    h->emf_q12.q = any((int16_t)-emf_dq_max, emf_dq_max);
+    h->emf_q12.q = any(-32767, 32767); /* a mean */
     h->lag_q12 = any(-32767, 32767);
     h->inv_kfi = any(0, 32767);
     h->emf_sum_max_q12 = any(0, 32767);
@@ -186,7 +186,7 @@ static void held_holds_again(const held_t *h)
 {
     //@ check held: h->phase <= HELD_STANDS && h->act <= HELD_GOES_ON && h->stood <= 2;
     //@ check held_emf_d: -emf_dq_max <= h->emf_q12.d <= emf_dq_max;
-    //@ check held_emf_q: -emf_dq_max <= h->emf_q12.q <= emf_dq_max;
+    //@ check held_emf_q: -32767 <= h->emf_q12.q;
     //@ check held_lag: -32767 <= h->lag_q12 && 0 <= h->inv_kfi && 0 <= h->emf_sum_max_q12;
     //@ check held_run_on: -16384 <= h->run_on <= 16384;
     //@ check held_turned: -32767 <= h->turned_q12;
