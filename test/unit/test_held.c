@@ -441,6 +441,34 @@ void test_the_frame_goes_on_by_what_a_rotor_turned_that_came_to_its_stop_and_not
     }
 }
 
+void test_what_a_rotor_came_is_of_this_question_alone_and_of_all_of_it(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t stopped;
+        int16_t came;
+        at(direction, FAST_ERPM, 100, 0, 0);
+        shaft->came_q12 = 3000; /* of before */
+        shaft->run_on = 2000;
+        shaft->turned_q12 = 5000;
+        steps(HELD_DOUBTS_MOST / HELD_DOUBTS_FAR + 1u);
+        stopped = estimator_next_angle(&drive.run.estimator);
+        while (shaft->phase != (uint16_t)HELD_ASKED) {
+            steps(1);
+        }
+        TEST_ASSERT_EQUAL_INT16(0, shaft->came_q12);
+        came = (int16_t)(direction * 8 * params.adaptation.emf_least_q12);
+        shaft->came_q12 = came;
+        shaft->act = (uint16_t)HELD_LEARN;
+        rig_emf(0, (int16_t)(direction * params.adaptation.emf_least_q12)); /* nor did it stand: it settles anew */
+        held_act(&drive, &params);
+        TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+        rig_emf(0, 0);
+        (void)answered();
+        steps(1);
+        TEST_ASSERT_INT16_WITHIN(2, angle_of(direction * came), (int16_t)(direction * (int16_t)(angle_t)(estimator_next_angle(&drive.run.estimator) - stopped)));
+    }
+}
+
 void test_resistance_is_learnt_within_the_adaptation_s_bounds_and_not_without_current(void)
 {
     stands(1, 1900);
@@ -734,7 +762,7 @@ void test_a_back_emf_that_turns_by_less_than_half_of_what_it_says_or_by_what_dea
         asked(1, emf_q12[n]);
         steps((uint16_t)(HELD_SETTLE_STEPS + 2u + ((n == 0u) ? 0u : 2u * HELD_ASK_STEPS))); /* settled, and two steps asked; of little after the filter's tail */
         rig_emf((int16_t)(-most + 8), emf_q12[n]);
-        steps(1);
+        steps((n == 0u) ? 1u : HELD_ASK_STEPS);
         TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
         rig_emf((int16_t)(-2 * most), emf_q12[n]);
         steps(1);
