@@ -79,8 +79,9 @@ def test_no_swing_is_asked_for_where_half_of_the_amplitude_is_beyond_the_voltage
 # ---- what is measured ----------------------------------------------------------------------------------------------------
 def test_only_whole_turns_are_measured():
     speed = lambda time_s: 600.0 + 300.0 * np.sin(2.0 * np.pi * 10.0 * time_s) # a turn takes a tenth of a second
-    part = pulse_sweep.whole_turns(trace(0.975, plant__speed_rpm=speed))
-    assert part.time_s[-1] == pytest.approx(0.9, abs=2e-4) and part.column("plant.speed_rpm").mean() == pytest.approx(600.0, abs=0.5)
+    for direction in (1.0, -1.0):
+        part = pulse_sweep.whole_turns(trace(0.975, plant__speed_rpm=lambda time_s, sign=direction: sign * speed(time_s)))
+        assert part.time_s[-1] == pytest.approx(0.9, abs=2e-4) and part.column("plant.speed_rpm").mean() == pytest.approx(direction * 600.0, abs=0.5)
     slow = trace(0.5, plant__speed_rpm=60.0)
     assert len(pulse_sweep.whole_turns(slow)) == len(slow)
 

@@ -135,6 +135,13 @@ def test_a_drift_is_wrong_unless_the_drive_names_a_limit():
     assert found([], **slow)["verdict"] == soak.OK # between the stretches the speed is on its way
 
 
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_speed_that_swings_once_a_turn_has_the_mean_of_whole_turns(direction):
+    swings = lambda time_s: direction * (600.0 + 120.0 * np.sin(2.0 * np.pi * 10.0 * (time_s - 1.0))) # noqa: E731 # of half a turn the mean is 3 % off
+    row = found([(1.0, 1.45, direction * 600.0)], plant__speed_rpm=swings, fw__speed_ref_rpm=direction * 600.0)
+    assert row["verdict"] == soak.OK and row["worst_speed_error_percent"] < 0.1
+
+
 def test_a_lost_lock_is_an_angle_that_stays_off_in_closed_loop():
     off = lambda for_s: lambda time_s: np.where((time_s > 1.2) & (time_s < 1.2 + for_s), 90.0, 0.0) # noqa: E731
     assert "loses its lock" in found(REST, fw__theta_est_deg=off(0.06))["verdict"]

@@ -188,7 +188,7 @@ def constant_current_rpm(inertia_kgm2: float, rpm: float, torque_nm: float, puls
 
 def whole_turns(part: Trace) -> Trace:
     """As much of it from its begin as is whole turns, so that a part of a pulse does not count in the mean; all of it where there is no turn."""
-    turns = np.cumsum(part.column("plant.speed_rpm").astype(np.float64)) * part.period_s / 60.0 if len(part) else np.zeros(1)
+    turns = np.abs(np.cumsum(part.column("plant.speed_rpm").astype(np.float64))) * part.period_s / 60.0 if len(part) else np.zeros(1)
     if turns[-1] < 1.0:
         return part
     last, half_s = int(np.searchsorted(turns, math.floor(turns[-1]))), 0.5 * part.period_s

@@ -22,6 +22,7 @@ from tools.common.trace import wrapped_deg
 from . import command_common, draws, injection, judge, page, reach, simulate
 from .board import Board
 from .held_sweep import Table as HeldTable
+from .pulse_sweep import whole_turns
 from .run import Run
 from .scenario import BRAKE, Event, Scenario, decel_rpm_s, param, start_time_s
 from .trial import Bench, coast_s
@@ -388,7 +389,7 @@ def _speed_error(trace: Any, rest: tuple[float, float, float], rated_rpm: float)
     everywhere = np.ones(len(part), dtype=bool)
     if not len(part) or judge.limited(part, everywhere) > 0.02:
         return None
-    mean_rpm = float(np.mean(part.column("plant.speed_rpm").astype(np.float64)))
+    mean_rpm = float(np.mean(whole_turns(part).column("plant.speed_rpm").astype(np.float64)))
     allowed_rpm = max(SPEED_ERROR * abs(rpm), 0.2 * SPEED_ERROR * rated_rpm)
     return from_s, 100.0 * (mean_rpm - rpm) / abs(rpm), 100.0 * allowed_rpm / abs(rpm)
 
