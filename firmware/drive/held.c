@@ -209,9 +209,9 @@ static uint16_t held_is_ahead(const drive_t *d, dq_t emf, int16_t least_q12)
 static void held_compare(drive_t *d, const drive_params_t *p, dq_t emf, uint16_t moved)
 {
     held_t *shaft = &d->run.held;
-    const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1;                                                         /* dead time shakes it by as much */
-    const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps);            /* since what it is compared with */
-    const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_turned(&d->run, p, held_times(shaft->emf_q12.q, steps))))); /* of a rotor's d part as fast as asked: pi, nearly */
+    const uint16_t most = (uint16_t)p->adaptation.emf_least_q12, least = most >> 1;                                                                                                        /* dead time shakes it by as much */
+    const uint16_t steps = (uint16_t)((shaft->steps > 2u * HELD_ASK_STEPS) ? shaft->steps - 2u * HELD_ASK_STEPS : shaft->steps);                                                           /* since what it is compared with */
+    const uint16_t half = (uint16_t)(3 * qm_abs(qm_mulhi(shaft->emf_q12.q, held_turned(&d->run, p, held_times(qm_less(shaft->emf_q12.q, along_direction(d, shaft->emf_q12.d)), steps))))); /* of a rotor's d part as fast as asked: pi, nearly */
     const uint16_t tells = (uint16_t)(half > least);
     const int16_t turned = qm_less(qm_clamp(shaft->emf_q12.d, INT16_MIN, 0), emf.d); /* -E sin: negative to either side, with E's sign that of the speed; what falls to 0 is the filter's tail */
     const uint16_t turns = (uint16_t)(steps >= HELD_ASK_STEPS && turned > (int16_t)(tells ? half : most) && (tells || shaft->steps > 2u * HELD_ASK_STEPS));
