@@ -770,6 +770,20 @@ void test_a_back_emf_that_turns_by_less_than_half_of_what_it_says_or_by_what_dea
     }
 }
 
+void test_a_back_emf_with_a_d_part_is_asked_for_as_long_as_the_speed_tells_that_both_parts_say(void)
+{
+    EACH_DIRECTION(direction) {
+        uint16_t alone, with;
+        asked(direction, 150);
+        alone = answered();
+        at(direction, FAST_ERPM, 100, 50, 150); /* Eq - Ed is 100 */
+        steps(HELD_DOUBTS_MOST / HELD_DOUBTS_FAR + 1u);
+        with = answered();
+        TEST_ASSERT_GREATER_THAN_UINT16(alone + 2u, with);
+        TEST_ASSERT_LESS_THAN_UINT16(HELD_SETTLE_STEPS + HELD_ASK_MOST_STEPS, with);
+    }
+}
+
 void test_a_back_emf_whose_turn_dead_time_would_hide_is_asked_for_longer(void)
 {
     static const struct {
