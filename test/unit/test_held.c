@@ -441,6 +441,19 @@ void test_the_frame_goes_on_by_what_a_rotor_turned_that_came_to_its_stop_and_not
     }
 }
 
+void test_the_frame_is_turned_back_by_a_quarter_turn_at_most_however_long_r_i_has_turned_it(void)
+{
+    EACH_DIRECTION(direction) {
+        angle_t stopped;
+        asked(direction, 400);
+        shaft->doubted_steps = 100; /* times 400: more than a word has */
+        stopped = estimator_next_angle(&drive.run.estimator);
+        (void)answered();
+        steps(1);
+        TEST_ASSERT_INT16_WITHIN(2, (int16_t)(direction * 16383), (int16_t)(angle_t)(stopped - estimator_next_angle(&drive.run.estimator)));
+    }
+}
+
 void test_what_a_rotor_came_is_of_this_question_alone_and_of_all_of_it(void)
 {
     EACH_DIRECTION(direction) {
@@ -1039,6 +1052,11 @@ void test_the_first_steps_turn_right_after_a_question_began_anew_may_be_dead_tim
 {
     const int16_t more = (int16_t)(params.adaptation.emf_least_q12 + 8);
     asked(1, (int16_t)(more + 8)); /* else it would be one that is ahead */
+    steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS - 1u);
+    rig_emf((int16_t)-more, (int16_t)(more + 8));
+    steps(1); /* nor in the step in which it begins anew */
+    TEST_ASSERT_EQUAL_UINT16(HELD_ASKED, shaft->phase);
+    asked(1, (int16_t)(more + 8));
     steps(HELD_SETTLE_STEPS + 2u * HELD_ASK_STEPS);
     rig_emf((int16_t)-more, (int16_t)(more + 8));
     steps(HELD_ASK_STEPS - 1u);
