@@ -422,6 +422,13 @@ def test_axe_finds_nothing_in_the_panel(page, pytestconfig, on, width):
     accessible(page, pytestconfig.rootpath.parent, on, width, lambda: inside(page, WHOLE))
 
 
+def test_the_focus_waits_on_the_cancel_button_until_the_button_that_was_pressed_is_free(page):
+    shown = [inside(page, f"{before}; views.loops.show({{ measurable: {{ why: {{ current: {why} }}, old: [] }} }}); [document.activeElement.id, by('measure-cancel').disabled]")
+             for before, why in (("views.loops.told.running = false; by('measure-current').disabled = false; by('measure-current').focus(); views.loops.told.running = true", "'busy'"),
+                                 ("views.loops.told.running = false", "'busy'"), ("", "null"))]
+    assert shown == [["measure-cancel", False], ["measure-cancel", False], ["measure-current", True]]
+
+
 def test_a_board_without_the_sine_shows_no_panel(chromium):
     with served(made_of=recorder_parts()) as running:
         assert not Page(chromium[0], running.url).one("#loops-card").is_displayed()

@@ -34,7 +34,10 @@ class LoopsView {
       button.disabled = Boolean(why);
     }
     if (running) { return; }
-    if (held === cancel && this.from && !this.from.disabled) { this.from.focus(); }
+    if (held === cancel && this.from) {
+      if (this.from.disabled) { return; } // a disabled button loses the focus, and a frame of before the end may come after it
+      this.from.focus();
+    }
     cancel.disabled = true;
   }
 
