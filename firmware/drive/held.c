@@ -30,7 +30,7 @@ uint16_t held_angle_stands(const held_t *shaft)
     return (uint16_t)(shaft->phase >= (uint16_t)HELD_SETTLES);
 }
 
-/** A product's low part, once for all of this: it is long. */
+/** qm_within(), once for all of this: it is long. */
 static NOINLINE int16_t held_within(int32_t value, int16_t least, int16_t most)
 {
     return qm_within(value, least, most);
@@ -140,6 +140,7 @@ static void held_stop_angle(drive_t *d, const drive_params_t *p, dq_t emf)
     shaft->run_on = 0;
     d->run.model.inv_kfi = 0;
     d->run.observer.omega_q16 = 0;
+    d->run.observer.innovation_erpm = 0; /* it would seem wrong for as long */
     d->run.estimator.omega_filtered_q16 = 0;
 }
 

@@ -256,24 +256,10 @@ uint16_t bus_chopper(chopper_t *c, int16_t bus_q15, uint16_t ticks)
     const uint16_t passed = (uint16_t)(ticks - c->ticks);
     const uint32_t given_back = qm_muluu(passed, CHOPPER_SHARE_Q10);
     c->ticks = ticks;
-    if (c->is_on) {
-        c->spent_q10 += qm_muluu(passed, (uint16_t)(1024u - CHOPPER_SHARE_Q10));
-    } else {
-        c->spent_q10 = (c->spent_q10 > given_back) ? c->spent_q10 - given_back : 0u;
-    }
-    if (c->spent_q10 >= CHOPPER_MOST_Q10) {
-        c->rests = 1;
-    } else if (c->spent_q10 <= CHOPPER_MOST_Q10 - (CHOPPER_MOST_Q10 >> CHOPPER_REST_SHIFT)) {
-        c->rests = 0;
-    } else { /* as it was */
-    }
-    if (bus_q15 >= CHOPPER_ON_Q15) {
-        c->is_on = 1;
-    } else if (bus_q15 < CHOPPER_OFF_Q15) {
-        c->is_on = 0;
-    } else { /* as it was */
-    }
-    c->is_on = (uint16_t)(c->is_on && !c->rests);
+    c->spent_q10 = c->is_on ? c->spent_q10 + qm_muluu(passed, (uint16_t)(1024u - CHOPPER_SHARE_Q10)) : (c->spent_q10 > given_back) ? c->spent_q10 - given_back
+                                                                                                                                   : 0u;
+    c->rests = (uint16_t)(c->spent_q10 >= CHOPPER_MOST_Q10 || (c->rests && c->spent_q10 > CHOPPER_MOST_Q10 - (CHOPPER_MOST_Q10 >> CHOPPER_REST_SHIFT)));
+    c->is_on = (uint16_t)((bus_q15 >= CHOPPER_ON_Q15 || (c->is_on && bus_q15 >= CHOPPER_OFF_Q15)) && !c->rests);
     return c->is_on;
 }
 

@@ -91,11 +91,12 @@ static void follow_speed(drive_t *d, const drive_params_t *p, const drive_sample
 }
 
 /** Once signals seem wrong, they are looked at in every such slot, and judged. */
-static void watch_signals(drive_t *d, const drive_params_t *p, const drive_samples_t *raw UNUSED)
+QM_INLINE void watch_signals(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
     if (d->run.observer.wrong_steps != 0u) {
         signals_check(d, p);
         signals_judge(d, p);
+        protection_check_bus_signal(d, p, bus_sample(raw->v_bus));
     }
 }
 

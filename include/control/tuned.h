@@ -174,6 +174,8 @@
 #define PROBE_LEAST_SALIENT_Q15 9830 /* [Q15] 0.3: such a d current takes of a salient motor's torque, too | lowspeed MOTOR=ipm_4pp_24v_2000 */
 #define SIGNALS_MOST_TIMES 2        /* [1] a deviation counts as twice its limit at most: then it may last 0.35 s | campaign */
 #define SIGNALS_MEAN_SHIFT 9        /* [shift] its mean is one over 512 ms | campaign */
+#define PROTECTION_BUS_FALL_SHIFT 4 /* [shift] the bus fell where its filter is behind by 1/16: after a fifth at once, for 1.6 ms | campaign */
+#define PROTECTION_BUS_STANDS_SHIFT 7 /* [shift] and stands again where it has lost less than 1/128 in 0.2 ms | campaign */
 #define SIGNALS_TURNS_MS 256u       /* [ms] from here on a whole turn ends the sum of back-EMF: angles that are wrong at its ends count less and less | campaign */
 #define SIGNALS_FLOWS_Q13 96       /* [Q13 A] six steps of the converter: where less flows one of them leaves up to a fifth of dead time's voltage more | campaign */
 #define SIGNALS_TURN_ERPM 6000      /* [erpm] faster turns have fewer than ten looks each, and looks that meet the same angles again would sum up; of them a tenth of a second is judged | campaign */

@@ -53,8 +53,8 @@
     X(14, CURRENT_SENSOR, FAULT_STAYS, "signals_which_is_wrong, signals_d_current, signals_offset", \
       "voltages and currents did not fit the motor for a tenth of a second, or the d current stayed off its reference: a current signal is wrong", \
       "check AN0 and AN1, the shunts and their amplifiers; with the motor at rest both must read the middle; check MOTOR_LS_MH") \
-    X(15, BUS_SENSOR, FAULT_STAYS, "protection_check_model", \
-      "the voltage that the motor takes asks for more flux than R, L and Kphi within their tolerances explain: the bus signal is wrong", \
+    X(15, BUS_SENSOR, FAULT_STAYS, "protection_check_model, protection_check_bus_signal", \
+      "the voltage that the motor takes asks for more flux than R, L and Kphi within their tolerances explain, or the bus fell at once and took the back-EMF with it: its signal is wrong", \
       "measure the bus and compare it with the drive's; check the divider, BUS_FULL_SCALE_V and MOTOR_KPHI_V_PER_KRPM") \
     X(16, OPEN_PHASE, FAULT_STAYS, "signals_which_is_wrong, signals_phases", \
       "voltages and currents did not fit the motor, and one phase carried much less current than the others; or it carried hardly any of what was asked of it", \

@@ -14,6 +14,10 @@ uint16_t protection_check_current(drive_t *d, const drive_params_t *p);
  *  measured. Slots 1, 5, 9, 13. @param now_q15 unfiltered @param bus_q15 filtered */
 void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15);
 
+/** A bus falls no faster than current is drawn from its capacitor, and the modulator follows: the back-EMF stays. A signal that falls by a fifth at once, and
+ *  stands, takes the back-EMF with it, faster than any load. Slots 3 and 11 in closed loop while signals seem wrong. @param now_q15 unfiltered */
+void protection_check_bus_signal(drive_t *d, const drive_params_t *p, int16_t now_q15);
+
 /** 1 where no flux within the header's tolerances explains the q back-EMF: what dead time, and R and L within theirs, may put into it is taken off first. With
  *  E = Eq as the model sees it, k the change of 1/Kphi, F the most flux and V_dead what dead time makes of it: E - V_dead - (R's part) - (L's part) > F E (1 + k),
  *  here divided by F, with a fifth more of the three parts. Where the motor brakes R i lowers the voltage, and the least R counts. */

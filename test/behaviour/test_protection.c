@@ -42,6 +42,46 @@ void test_each_cause_trips_in_time_and_its_fault_stays_until_s2(void)
     }
 }
 
+void test_a_bus_signal_that_falls_by_a_fifth_or_more_is_named_before_the_rotor_is_lost(void)
+{
+    for (uint16_t n = 0; n < 8u; n++) {
+        bench_set_up();
+        set("load.constant_nm", 0.03);
+        run_at(1000.0 + 200.0 * n);
+        wait_s(0.0002 * n); /* wherever the slow work is */
+        set("fault.vbus_gain", (n & 1u) ? 0.7 : 0.8);
+        TEST_ASSERT_TRUE(seconds_to_fault(0.1) < 0.004);
+        assert_fault(FAULT_BUS_SENSOR);
+    }
+}
+
+/** The bus falls by what the drive draws, or at once with a supply that takes current back. @param after_s negative: the load comes before the supply falls */
+static void fall_by_a_third(double sinks, double load_nm, double after_s)
+{
+    bench_set_up();
+    run_at(1500.0);
+    set("supply.sinks", sinks);
+    set("supply.resistance_ohm", 0.02);
+    if (after_s < 0.0) {
+        set("load.constant_nm", load_nm);
+        wait_s(-after_s);
+    }
+    set("supply.voltage_v", 16.0);
+    wait_s((after_s > 0.0) ? after_s : 0.0);
+    set("load.constant_nm", load_nm);
+    wait_s(0.1);
+    TEST_ASSERT_EQUAL_INT(FAULT_NONE, board_drive.fault);
+}
+
+void test_a_bus_that_falls_by_a_third_is_no_signals_even_where_a_load_comes_in_the_same_millisecond(void)
+{
+    for (int n = -4; n <= 4; n++) {
+        fall_by_a_third(0.0, 0.1, 0.0005 * n);
+    }
+    fall_by_a_third(1.0, 0.0, 0.0);
+    fall_by_a_third(1.0, 0.06, 0.01);
+}
+
 void test_under_voltage_at_rest_is_no_fault(void)
 {
     power_on();

@@ -159,6 +159,17 @@ def test_other_flags_rebuild_and_the_same_flags_do_not():
     assert all(re.search(rf"^\$X/{name}: .*\$X/flags", rules, re.MULTILINE) for name in (r"image\.o", r"app\.o", "%\\.o"))
 
 
+@needs_compiler
+def test_parameters_in_ram_by_the_header_are_compiled_as_by_defines(tmp_path):
+    header = (ROOT / "userparams.h").read_text(encoding="utf-8")
+    (tmp_path / "userparams.h").write_text(header.replace("/* #define PARAMS_IN_RAM */", "#define PARAMS_IN_RAM"), encoding="utf-8")
+    records = []
+    for words in (["DEFINES=-DPARAMS_IN_RAM"], [f"USERPARAMS={tmp_path}"], []):
+        assert make("build/target-check/flags", "VARIANT=check", *words).returncode == 0
+        records.append(re.findall(r"--param=max-inline-insns-auto=[^-]*(?:-fno-tree-copy-prop)?", (ROOT / "build/target-check/flags").read_text(encoding="utf-8")))
+    assert records[0] == records[1] != records[2] and len(records[0]) == 1
+
+
 # ---- sources with a mistake, in a copy of the project ----------------------------------------------------------------------
 class Tree:
     def __init__(self, root: Path) -> None:

@@ -634,6 +634,32 @@ void test_no_model_and_no_rotor_is_checked_outside_closed_loop(void)
     TEST_ASSERT_EQUAL_UINT16(PROBE_WAIT, drive.run.probe_phase);
 }
 
+void test_a_bus_signal_that_fell_stands_again_and_takes_the_back_emf_with_it_is_named(void)
+{
+    static const struct {
+        int16_t behind, falls, beyond; /* the filter, in 1/4096; since the last step, in 1/1024; the gate, in counts */
+        uint16_t wrong_steps;
+        drive_fault_t fault;
+    } cases[] = { { 260, 0, 1, 1, FAULT_BUS_SENSOR }, { 260, -300, 1, 1, FAULT_BUS_SENSOR }, { 260, 7, 1, 1, FAULT_BUS_SENSOR }, { 260, 9, 1, 1, FAULT_NONE }, { 260, 0, 1, 0, FAULT_NONE },
+                  { 252, 0, 1000, 1, FAULT_NONE }, { -1000, 0, 1000, 1, FAULT_NONE }, { 1000, 0, 0, 1, FAULT_NONE } };
+    EACH_DIRECTION(sign) {
+        EACH(n, cases) {
+            for (int16_t along = -1; along <= 1; along = (int16_t)(along + 2)) { /* it seems slower; faster */
+                rig_closed(sign, (int16_t)(sign * 5000));
+                const float now_v = (float)BUS_FULL_SCALE_V * (float)qm_hi(drive.bus_q31) / 32768.0F * (1.0F - (float)cases[n].behind / 4096.0F);
+                samples.v_bus = rig_raw_bus(now_v * (1.0F + (float)cases[n].falls / 1024.0F));
+                bus_update_gain(&drive, &params, bus_sample(samples.v_bus));
+                samples.v_bus = rig_raw_bus(now_v);
+                drive.run.observer.wrong_steps = cases[n].wrong_steps;
+                drive.run.observer.innovation_erpm = (int16_t)(sign * along * (drive.run.observer.gate_erpm + cases[n].beyond));
+                rig_slow((n & 1u) ? 3 : 11);
+                TEST_ASSERT_EQUAL_UINT16_MESSAGE((along < 0) ? cases[n].fault : FAULT_NONE, drive.fault, golden_row(n));
+                drive.fault = (uint16_t)FAULT_NONE;
+            }
+        }
+    }
+}
+
 void test_signals_and_model_are_checked_in_closed_loop_only_signals_that_seem_wrong_in_slots_3_and_11(void)
 {
     uint16_t part;

@@ -25,8 +25,9 @@ X := build/target$(target_opt_suffix)$(if $(VARIANT),-$(VARIANT))
 # -fno-reorder-blocks, -fno-gcse, -fno-tree-pre and -fno-tree-ter: a tenth less flash at the same cycles. What several call is inline where it says so,
 # or is tiny: another 800 bytes; tinier still where parameters are no constants, or they could not be kept beside the scope. At -O1 what is constant must be
 # known to functions, or the image does not fit the chip. -fno-jump-tables: the longest path can be known.
-target_tiny = $(if $(findstring PARAMS_IN_RAM,$(DEFINES)),8,16)
-target_inline = $(if $(filter -O2,$(OPT)),-fno-early-inlining -fno-ipa-sra -fno-tree-ch --param=max-inline-insns-auto=$(target_tiny),-fipa-cp)
+target_in_ram = $(findstring PARAMS_IN_RAM,$(DEFINES) $(shell grep '^ *$(hash) *define  *PARAMS_IN_RAM' $(call quoted,$(or $(USERPARAMS),.)/userparams.h) 2>/dev/null))
+target_tiny = --param=max-inline-insns-auto=$(if $(target_in_ram),7 -fno-tree-copy-prop,16)
+target_inline = $(if $(filter -O2,$(OPT)),-fno-early-inlining -fno-ipa-sra -fno-tree-ch $(target_tiny),-fipa-cp)
 target_flags = -std=gnu99 $(OPT) -g -fno-reorder-blocks -fno-gcse -fno-tree-pre -fno-tree-ter -fno-jump-tables $(target_inline) -ffunction-sections
 target_whole := -fwhole-program
 target_includes = $(if $(USERPARAMS),-I$X/header -I$(call quoted,$(USERPARAMS))) -Iinclude -I.
