@@ -161,11 +161,13 @@ void test_neither_observer_nor_estimator_has_a_speed_where_the_angle_stops_and_b
         angle_t next;
         at(direction, FAST_ERPM, 100, 0, 0);
         shaft->emf_q12.q = (int16_t)(direction * 900);
+        drive.run.observer.innovation_erpm = (int16_t)(direction * -900);
         rho_q32 = drive.run.estimator.rho_q32;
         next = estimator_next_angle(&drive.run.estimator);
         steps(2);
         TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.observer.omega_q16);
+        TEST_ASSERT_EQUAL_INT16(0, drive.run.observer.innovation_erpm);
         TEST_ASSERT_EQUAL_INT32(0, drive.run.estimator.omega_filtered_q16);
         TEST_ASSERT_EQUAL_HEX32((uint32_t)(angle_t)(next - estimator_next_angle(&drive.run.estimator)) << 16,
                                 qm_turn_sub(rho_q32, drive.run.estimator.rho_q32));
