@@ -87,7 +87,7 @@ def schedule() -> str:
     """The slots, and what each of their functions does, as its comment says."""
     found = rows("include", "drive/schedule.h", "SCHEDULE_TABLE", "#number #first #first_in #second #second_in")
     source = (ROOT / "firmware/drive/schedule.c").read_text(encoding="utf-8")
-    says = {name: " ".join(text.split()) for text, name in re.findall(r"/\*\* ((?:(?!\*/).)*?) \*/\nstatic void (\w+)\(", source, re.DOTALL)}
+    says = {name: " ".join(text.split()) for text, name in re.findall(r"/\*\* ((?:(?!\*/).)*?) \*/\n(?:static|QM_INLINE) void (\w+)\(", source, re.DOTALL)}
     slots: dict[str, list[str]] = {}
     for number, first, _, second, _ in found:
         for name in (first, second):
