@@ -19,7 +19,7 @@ from tools.live.faults import FAULTS
 from tools.live.recording import LONGEST_S, SENT
 
 ENDS = {"open_a": "OPEN_PHASE", "open_b": "OPEN_PHASE", "open_c": "OPEN_PHASE", "never_on": "CURRENT_SENSOR", "never_off": "OVERCURRENT_HW",
-        "ia_zero": "OPEN_PHASE", "ib_stuck": "CURRENT_SENSOR", "ib_rail": "OVERCURRENT_SW", "ia_gain": "CURRENT_SENSOR", "bus_half": "UNDERVOLTAGE",
+        "ia_zero": "OPEN_PHASE", "ib_stuck": "CURRENT_SENSOR", "ib_rail": "OVERCURRENT_SW", "ia_gain": "CURRENT_SENSOR", "bus_half": "BUS_SENSOR",
         "bus_rail": "OVERVOLTAGE", "supply_lost": "UNDERVOLTAGE", "blocked": "STALL", "interrupts_some": "INTERRUPT_RATE", "interrupts_all": "ADC_LOST"}
 """What the drive says within a second at this speed and load; the others it rides through."""
 TURN_PERIODS = 1000
