@@ -7,6 +7,8 @@ import time
 import pytest
 
 SIZE = (1400, 900)
+PATIENCE_S = 60.0
+"""For what comes at once on a quiet machine; a busy one needs many times as long."""
 CONTROLS = "button, select, input, summary, a[href], .push, #pot, [tabindex='0']"
 PLACES = f"""[...document.querySelectorAll("{CONTROLS}")].filter((e) => e.getClientRects().length).map((e) => {{
     const r = e.getBoundingClientRect(); return [e.id || e.dataset.fault || e.dataset.button || e.dataset.mode || e.name || e.tagName, r.left, r.top + scrollY, r.right, r.bottom + scrollY]; }})"""
@@ -50,7 +52,7 @@ class Page:
     def frame(self) -> dict:
         return self.run("return window.eval('foc33.frame')")
 
-    def wait(self, script: str, what: str, seconds: float = 15.0):
+    def wait(self, script: str, what: str, seconds: float = PATIENCE_S):
         end_s = time.monotonic() + seconds
         while not (value := self.run(script)):
             assert time.monotonic() < end_s, f"{what}: {self.run('return document.body.innerText')[:600]}"

@@ -14,8 +14,8 @@ INLINE uint16_t protection_check_current(drive_t *d, const drive_params_t *p)
     return 0;
 }
 
-#define PROTECTION_BUS_STANDS ((int16_t)(DUTY_PER_VOLT_NUMERATOR >> (16 + PROTECTION_BUS_STANDS_SHIFT)))
-#define PROTECTION_BUS_END_Q15 32640 /* the converter's last steps: more cannot be told from a broken signal */
+#define PROTECTION_BUS_STANDS ((int16_t)(DUTY_PER_VOLT_NUMERATOR >> (16 + PROTECTION_BUS_STANDS_SHIFT))) /* numerator/2^16 */
+#define PROTECTION_BUS_END_Q15 32640                                                                     /* the converter's last steps: more cannot be told from a broken signal */
 
 void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, int16_t bus_q15)
 {
@@ -36,7 +36,7 @@ void protection_check_bus(drive_t *d, const drive_params_t *p, int16_t now_q15, 
 void protection_check_bus_signal(drive_t *d, const drive_params_t *p, int16_t now_q15)
 {
     const int16_t bus_q15 = qm_hi(d->bus_q31), against = along_direction(d, d->run.observer.innovation_erpm);
-    const uint16_t before = qm_mulhi_uu(d->duty_per_volt_q16, (uint16_t)((uint16_t)now_q15 << 1)); /* the modulator's gain has the last step's bus in it */
+    const uint16_t before = qm_mulhi_uu(d->duty_per_volt_q16, (uint16_t)((uint16_t)now_q15 << 1)); /* numerator/2^16 by the modulator's gain, which has the last step's bus in it */
     if (bus_q15 - now_q15 > bus_q15 >> PROTECTION_BUS_FALL_SHIFT && (int16_t)((uint16_t)(p->duty_per_volt_numerator >> 16) - before) < PROTECTION_BUS_STANDS && against < -d->run.observer.gate_erpm) {
         drive_raise(d, FAULT_BUS_SENSOR);
     }

@@ -165,8 +165,8 @@
 #define PROBE_WAIT_STEPS 13         /* [32 periods] the rotor seems to turn for 20 ms before a probe | run SCENARIO=fault_stall */
 #define PROBE_STEPS 25              /* [32 periods] a probe takes 40 ms: more than the estimator's filters at the lowest speed | run SCENARIO=fault_stall */
 #define PROBE_DIP_STEPS 6           /* [32 periods] or soon after a speed 10 ms below three quarters of the reference: no ripple lasts so long | run SCENARIO=fault_stall */
-#define PROBE_CALM_STEPS 63       /* [steps] of 32 periods, a tenth of a second after a probe: until its own unrest is over | run SCENARIO=fault_stall */
-#define PROBE_SOON_STEPS 312      /* [steps] of 32 periods, half a second from one to the next, where something changed fast | run SCENARIO=fault_stall */
+#define PROBE_CALM_STEPS 63         /* [steps] of 32 periods, a tenth of a second after a probe: until its own unrest is over | run SCENARIO=fault_stall */
+#define PROBE_SOON_STEPS 312        /* [steps] of 32 periods, half a second from one to the next, where something changed fast | run SCENARIO=fault_stall */
 #define PROBE_EVERY_STEPS 3125      /* [32 periods] five seconds from one to the next | lowspeed */
 #define PROBE_SLOPE_SHIFT 3         /* [shift] the largest current takes 8 steps, so that the estimate does not jump | lowspeed */
 #define PROBE_MOST_Q15 22528        /* [Q15] of the largest current, so that as much q current is left | lowspeed */
@@ -177,7 +177,7 @@
 #define PROTECTION_BUS_FALL_SHIFT 4 /* [shift] the bus fell where its filter is behind by 1/16: after a fifth at once, for 1.6 ms | campaign */
 #define PROTECTION_BUS_STANDS_SHIFT 7 /* [shift] and stands again where it has lost less than 1/128 in 0.2 ms | campaign */
 #define SIGNALS_TURNS_MS 256u       /* [ms] from here on a whole turn ends the sum of back-EMF: angles that are wrong at its ends count less and less | campaign */
-#define SIGNALS_FLOWS_Q13 96       /* [Q13 A] six steps of the converter: where less flows one of them leaves up to a fifth of dead time's voltage more | campaign */
+#define SIGNALS_FLOWS_Q13 96        /* [Q13 A] six steps of the converter: where less flows one of them leaves up to a fifth of dead time's voltage more | campaign */
 #define SIGNALS_TURN_ERPM 6000      /* [erpm] faster turns have fewer than ten looks each, and looks that meet the same angles again would sum up; of them a tenth of a second is judged | campaign */
 #define SIGNALS_SAMPLES 64u         /* [samples] of the phases' currents that are compared, some 62 ms | run SCENARIO=fault_open_phase */
 

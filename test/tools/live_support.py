@@ -9,6 +9,8 @@ import time
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
+from live_browser import PATIENCE_S
+
 from tools.common import paths
 from tools.live import board, symbols
 from tools.live.pace import FRAME_S, Pacemaker
@@ -135,7 +137,7 @@ def served(*arguments: str, made_of: board.Parts | None = None) -> Iterator[Serv
         server.end()
 
 
-def until(found, what, seconds: float = 15.0):
+def until(found, what, seconds: float = PATIENCE_S):
     """Waits for something true; else `what` has not happened, a text or what makes it."""
     end_s = time.monotonic() + seconds
     while not (value := found()):

@@ -154,7 +154,7 @@ def test_while_the_motor_turns_it_is_refused_by_its_reason(bench: Bench) -> None
     until(lambda: bench.frame()["state"] == "STOPPED", "not STOPPED")
     bench.do(press="S2")
     bench.do(release="S2")
-    until(lambda: bench.frame()["state"] == "CLOSED", "does not turn", 30.0)
+    until(lambda: bench.frame()["state"] == "CLOSED", "does not turn")
     bench.do(keep=True)
     bench.logs("keep: refused: only in STOPPED, 5 s after the bridge was on: the rotor must stand")
     bench.says(state="NONE")
@@ -174,7 +174,7 @@ def test_a_board_at_a_serial_port_is_tuned_over_its_line() -> None:
         wanted = tuning.compiler.build({"SPEED_BANDWIDTH_HZ": "9.5"}).params
         there = (ctypes.c_ubyte * len(wanted)).in_dll(virtual.library.c, "board_params")
         assert wanted != tuning.built.params == bytes(there)
-        until(lambda: bytes(there) == wanted, "it is not written", 30.0)
+        until(lambda: bytes(there) == wanted, "it is not written")
         assert set(real.hello()["tuning"]) == {"subjects", "changed", "undo", "lost", "foreign"} and real.header() == tuning.saved()
         until(lambda: (real.run(0.0), real.frame(), any(line["text"] == "SPEED_BANDWIDTH_HZ 9.5" for line in real.log))[2], "it is not logged")
     finally:

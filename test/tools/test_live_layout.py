@@ -333,14 +333,14 @@ def test_a_board_that_was_switched_off_has_no_state_and_no_new_curve():
         assert RealBoard.SILENT_S == 1.0 and len(frame()["strip"]) == 1
         line.on = False
         until(lambda: frame()["silent"], "nobody says it", 5.0)
-        until(lambda: real.scope.told["status"].startswith("no connection"), "the scope says nothing", 20.0)
+        until(lambda: real.scope.told["status"].startswith("no connection"), "the scope says nothing")
         silent = frame()
         assert (silent["state"], silent["now"], silent["strip"], silent["limits"], silent["outputs"]) == ("", None, [], [], 0)
         line.on = True
-        until(lambda: frame()["state"] == "STOPPED", "it does not come back", 20.0)
+        until(lambda: frame()["state"] == "STOPPED", "it does not come back")
         texts = [entry["text"] for entry in real.log]
         assert texts.count("no answer") == 1 and texts.count("it answers again") == 1
-        until(lambda: real.scope.told["status"] == "stop", "the scope still says that it has no connection", 20.0)
+        until(lambda: real.scope.told["status"] == "stop", "the scope still says that it has no connection")
     finally:
         real.end()
         living.close()

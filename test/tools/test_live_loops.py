@@ -9,7 +9,7 @@ import json
 import time
 
 import pytest
-from live_browser import PLACES, SEEN, Page, accessible, dark, inside, overlapping, resized
+from live_browser import PATIENCE_S, PLACES, SEEN, Page, accessible, dark, inside, overlapping, resized
 from live_support import Living, kept_parts, known, parts, recorder_parts, served, until
 from support import refusal
 
@@ -54,15 +54,15 @@ class Loops(Living):
             self.state("CLOSED")
 
     def state(self, name: str) -> None:
-        until(lambda: self.board.state == name, lambda: f"not {name}: {self.board.state}", 30.0)
+        until(lambda: self.board.state == name, lambda: f"not {name}: {self.board.state}")
 
     def measured(self) -> dict:
         """How the measurement has ended."""
-        until(lambda: self.loops.asked is None and not self.loops.told["running"], lambda: f"it does not end: {self.loops.told}", 60.0)
+        until(lambda: self.loops.asked is None and not self.loops.told["running"], lambda: f"it does not end: {self.loops.told}", 4 * PATIENCE_S)
         return self.loops.told
 
     def first_point(self) -> None:
-        until(lambda: self.loops.told["done"] >= 1, lambda: f"no point: {self.loops.told['said']}", 30.0)
+        until(lambda: self.loops.told["done"] >= 1, lambda: f"no point: {self.loops.told['said']}")
 
     def left(self) -> int:
         """Of the firmware's sine, read in the link's thread."""
@@ -171,12 +171,12 @@ def test_a_step_of_the_running_motor_is_as_the_model_says_and_nobody_has_lost_th
 def test_a_speed_step_that_ends_early_gives_the_command_back_and_s2_still_stops_the_motor(living, monkeypatch):
     living.turning()
     living.do(measure={"step": "speed", "size": 10})
-    until(lambda: living.loops.steps.told["said"].startswith("1 of"), lambda: str(living.loops.steps.told), 30.0)
+    until(lambda: living.loops.steps.told["said"].startswith("1 of"), lambda: str(living.loops.steps.told))
     living.do(measure="cancel")
     living.measured()
     assert living.loops.steps.told["said"] == "cancelled" and living.loops.steps.told["figures"] is None and living.board.state == "CLOSED"
     living.do(measure={"step": "speed", "size": 10})
-    until(lambda: living.loops.steps.told["said"].startswith("1 of"), lambda: str(living.loops.steps.told), 30.0)
+    until(lambda: living.loops.steps.told["said"].startswith("1 of"), lambda: str(living.loops.steps.told))
     living.click_s2()
     living.measured()
     assert "the motor has left CLOSED" in living.loops.steps.told["said"]
@@ -272,7 +272,7 @@ def test_the_current_loop_with_the_forced_angle_has_the_margin_of_the_model():
             maker.call(lambda command=command: item.act(command)).result(5)
         until(lambda: item.state == "RAMP", "it does not turn")
         maker.call(lambda: item.act({"measure": "current"})).result(5)
-        until(lambda: not item.loops.told["running"], lambda: str(item.loops.told), 60.0)
+        until(lambda: not item.loops.told["running"], lambda: str(item.loops.told), 4 * PATIENCE_S)
         told = item.loops.told
         assert told["done"] == told["of"] and told["note"] == "" and item.state == "RAMP", told
         assert abs(told["margins"]["difference"]) < WITHIN_DEG and 900.0 < told["margins"]["measured"][1] < 1100.0
@@ -345,9 +345,9 @@ def test_the_keyboard_alone_measures_and_cancels_and_the_curve_grows(page, chrom
     assert focused(page) == "measure-current"
     press("\ue007") # Enter
     page.wait("return document.activeElement.id === 'measure-cancel'", "the focus stays on a button that is disabled")
-    assert page.wait(f"return /^current loop: 1 of 25$/.test({SAID})", "no progress", 30.0) and page.text("#scope-status") == "suspended while a loop is measured"
+    assert page.wait(f"return /^current loop: 1 of 25$/.test({SAID})", "no progress") and page.text("#scope-status") == "suspended while a loop is measured"
     assert page.text("#loops-why") == "the current loop is being measured" and not page.one("#measure-speed").is_enabled()
-    page.wait("return document.querySelectorAll('#loops-plot circle').length === 4 && document.querySelectorAll('#loops-numbers tr').length === 3", "no second point", 30.0)
+    page.wait("return document.querySelectorAll('#loops-plot circle').length === 4 && document.querySelectorAll('#loops-numbers tr').length === 3", "no second point")
     press("\ue007")
     page.wait(f"return {SAID}.startsWith('current loop: cancelled; ') && document.activeElement.id === 'measure-current'", "no end, or the focus is lost")
     assert page.text("#scope-status") == "stopped" and len(page.driver.find_elements("css selector", "#loops-plot circle")) >= 4

@@ -7,6 +7,7 @@ import os
 import time
 
 import pytest
+from live_browser import PATIENCE_S
 from live_support import Living, known, parts, until
 from support import command, refusal, refused
 
@@ -41,7 +42,7 @@ class Desk(Living):
         super().close()
 
     def state(self, name: str) -> None:
-        until(lambda: self.frame()["state"] == name, f"not {name}: {self.frame()}", 30.0)
+        until(lambda: self.frame()["state"] == name, f"not {name}: {self.frame()}")
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +100,7 @@ def test_the_motor_stops_when_the_tab_that_has_started_it_is_closed(desk):
 def test_a_fault_is_told_and_the_page_clears_it(desk):
     desk.do(fault=["blocked", True])
     desk.page.act({"start": 1000.0})
-    until(lambda: desk.frame()["fault"] not in ("", "NONE"), "no fault", 30.0)
+    until(lambda: desk.frame()["fault"] not in ("", "NONE"), "no fault")
     desk.do(fault=["blocked", False])
     desk.page.act({"stop": True})
     desk.page.act({"clear": True})
@@ -144,7 +145,7 @@ def test_a_loop_and_a_step_are_measured_while_the_watch_and_the_lease_go_on_and_
     desk.state("CLOSED")
     desk.page.act({"measure": "speed"})
     frames = [desk.frame()]
-    until(lambda: (frames.append(desk.frame()), not loops.told["running"])[1], lambda: str(loops.told), 60.0)
+    until(lambda: (frames.append(desk.frame()), not loops.told["running"])[1], lambda: str(loops.told), 4 * PATIENCE_S)
     assert loops.told["done"] == loops.told["of"] == 4 and loops.told["margins"]["measured"][1] is not None, loops.told
     assert {frame["state"] for frame in frames} == {"CLOSED"} and not any(frame["silent"] for frame in frames)
     assert max(frame["now"]["lease_ms"] for frame in frames) <= LEASE_MS and len({frame["now"]["angle_deg"] for frame in frames}) > 20
@@ -154,21 +155,21 @@ def test_a_loop_and_a_step_are_measured_while_the_watch_and_the_lease_go_on_and_
     desk.page.act({"measure": {"step": "speed", "size": 20}}) # of a tenth, the estimate's ripple moves the 90 % by a third of the rise
     refusal(lambda: desk.page.act({"target": 1600.0}), "a step of the speed is being measured")
     frames = []
-    until(lambda: (frames.append(desk.frame()), not loops.told["running"])[1], lambda: str(loops.steps.told), 60.0)
+    until(lambda: (frames.append(desk.frame()), not loops.told["running"])[1], lambda: str(loops.steps.told), 4 * PATIENCE_S)
     assert loops.steps.told["figures"]["measured"]["rise_s"] == pytest.approx(loops.steps.told["figures"]["model"]["rise_s"], rel=0.3), loops.steps.told
     assert {frame["state"] for frame in frames} == {"CLOSED"} and max(frame["now"]["target_rpm"] for frame in frames) == pytest.approx(1800.0, abs=20.0)
     until(lambda: desk.frame()["now"]["target_rpm"] == pytest.approx(1500.0, abs=2.0), "the target does not come back")
     desk.page.act({"measure": "speed"})
-    until(lambda: (desk.frame(), loops.told["done"])[1], "no point", 30.0)
+    until(lambda: (desk.frame(), loops.told["done"])[1], "no point")
     desk.pace(0.0001)
-    until(lambda: (desk.frame(), not loops.told["running"])[1], "it does not end", 30.0)
+    until(lambda: (desk.frame(), not loops.told["running"])[1], "it does not end")
     assert loops.told["said"].startswith("no connection: no answer to service") and loops.told["said"].endswith("; 1 of 4 points measured")
     desk.pace(1.0)
-    until(lambda: not desk.frame()["silent"] and desk.frame()["measurable"]["why"]["speed"] is None, "it does not come back", 30.0)
+    until(lambda: not desk.frame()["silent"] and desk.frame()["measurable"]["why"]["speed"] is None, "it does not come back")
     desk.page.act({"measure": "speed"})
-    until(lambda: (desk.frame(), loops.told["done"])[1], "no point", 30.0)
+    until(lambda: (desk.frame(), loops.told["done"])[1], "no point")
     desk.page.left("a tab")
-    until(lambda: (desk.frame(), not loops.told["running"])[1], "it does not end", 30.0)
+    until(lambda: (desk.frame(), not loops.told["running"])[1], "it does not end")
     assert "the motor has left CLOSED" in loops.told["said"]
     desk.frame()
     assert any("speed loop: the motor has left CLOSED" in line["text"] for line in desk.page.log)
@@ -191,9 +192,9 @@ def test_csv_is_what_was_read(desk):
 def test_a_board_that_falls_silent_is_told(desk):
     until(lambda: not desk.frame()["silent"], "it is not heard")
     desk.pace(0.0001)
-    until(lambda: desk.frame()["silent"], "nobody says it", 30.0)
+    until(lambda: desk.frame()["silent"], "nobody says it")
     desk.pace(1.0)
-    until(lambda: not desk.frame()["silent"], "it does not come back", 30.0)
+    until(lambda: not desk.frame()["silent"], "it does not come back")
 
 
 def test_what_lies_together_is_read_together():

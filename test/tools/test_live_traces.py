@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from live_browser import SIZE, Page
+from live_browser import PATIENCE_S, SIZE, Page
 from live_support import recorder_parts, served, until
 
 from tools.common import drive_tables
@@ -411,7 +411,7 @@ def test_the_record_of_a_fault_comes_by_itself_with_cause_and_remedy_beside_it(p
     assert message(page).startswith("CSV: no trace yet")
     page.run("return new Promise((done) => setTimeout(done, 500))") # until the rows before a fault are there
     page.click("[data-fault=bus_rail]")
-    page.wait("return document.querySelector('#scope-why b')?.textContent === 'OVERVOLTAGE'", "no record", 60.0)
+    page.wait("return document.querySelector('#scope-why b')?.textContent === 'OVERVOLTAGE'", "no record", 4 * PATIENCE_S)
     row = next(row for row in drive_tables.faults() if row.name == "OVERVOLTAGE")
     assert page.text("#scope-why") == f"OVERVOLTAGE, at 0 ms: {row.cause}. Remedy: {row.remedy}."
     item = inside(page, "views.scope.trace")
@@ -436,7 +436,7 @@ def test_a_firmware_without_the_scope_shows_the_rows_of_its_fault_recorder_and_n
         page.click("[data-button=S2]")
         page.state("CLOSED")
         page.click("[data-fault=bus_rail]")
-        page.wait("return document.querySelector('#scope-why b')?.textContent === 'OVERVOLTAGE'", "no record", 60.0)
+        page.wait("return document.querySelector('#scope-why b')?.textContent === 'OVERVOLTAGE'", "no record", 4 * PATIENCE_S)
         assert "Remedy: brake more gently" in page.text("#scope-why") and inside(page, places) == before
         item = inside(page, "views.scope.trace")
         assert item["names"] == ["i_a", "i_b", "v_d", "v_q", "angle", "speed", "bus", "state"] and len(item["rows"]) == 64

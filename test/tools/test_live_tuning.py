@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from live_browser import SIZE, Page, accessible
+from live_browser import PATIENCE_S, SIZE, Page, accessible
 from live_support import KEPT_DEFINES, kept_parts, parts, served, until
 from support import refusal
 
@@ -75,7 +75,7 @@ class Bench:
         self.written()
 
     def written(self) -> None:
-        until(lambda: not self.tuning.todo, "it is not written", 30.0)
+        until(lambda: not self.tuning.todo, "it is not written")
 
     def logs(self, text: str) -> None:
         until(lambda: (self.frame(), any(line["text"] == text for line in list(self.board.log)))[1], lambda: f"{text}: {[line['text'] for line in self.board.log]}")
@@ -166,12 +166,12 @@ def test_a_turning_motor_follows_the_changed_ramp(bench):
     until(lambda: bench.frame()["state"] == "STOPPED", "not STOPPED")
     bench.do(press="S2")
     bench.do(release="S2")
-    until(lambda: bench.frame()["state"] == "CLOSED", "does not turn", 30.0)
+    until(lambda: bench.frame()["state"] == "CLOSED", "does not turn")
     bench.change("SPEEDREFRAMP_RPM_PER_S", "300")
-    until(lambda: bench.frame()["now"]["reference_rpm"] < 152.0, "not at its lowest speed", 30.0)
+    until(lambda: bench.frame()["now"]["reference_rpm"] < 152.0, "not at its lowest speed")
     bench.do(set=["input.pot", 1.0])
     seen = []
-    until(lambda: (seen.append(bench.frame()), seen[-1]["t"] > seen[0]["t"] + 1.0)[1], "no time passes", 30.0)
+    until(lambda: (seen.append(bench.frame()), seen[-1]["t"] > seen[0]["t"] + 1.0)[1], "no time passes")
     slope = (seen[-1]["now"]["reference_rpm"] - seen[0]["now"]["reference_rpm"]) / (seen[-1]["t"] - seen[0]["t"])
     assert slope == pytest.approx(300.0, rel=0.1)
     bench.do(set=["input.pot", 0.0])
@@ -222,11 +222,11 @@ def test_a_board_that_was_switched_off_has_lost_them_and_gets_them_again(bench):
     bench.change("SPEED_BANDWIDTH_HZ", "9.5")
     changed = bench.memory()
     bench.do(power=True)
-    until(lambda: bench.tuning.told()["lost"], "nobody says it", 30.0)
+    until(lambda: bench.tuning.told()["lost"], "nobody says it")
     assert bench.memory() == header
     bench.logs("the board has lost the changed parameters")
     bench.tuning.ask("again")
-    until(lambda: not bench.tuning.told()["lost"], "still lost", 30.0)
+    until(lambda: not bench.tuning.told()["lost"], "still lost")
     assert bench.memory() == changed
     assert {"tuning": bench.tuning.told()} in bench.messages
 
@@ -348,7 +348,7 @@ def field(page: Page, subject: str, name: str):
 
 def waits(page: Page, script: str, what: str) -> None:
     """The compiler takes its time."""
-    page.wait(f"return {script}", what, 60.0)
+    page.wait(f"return {script}", what, 4 * PATIENCE_S)
 
 
 def typed(page: Page, name: str, text: str) -> None:
