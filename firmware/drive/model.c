@@ -106,21 +106,16 @@ static uint16_t model_is_taught(const drive_run_t *run)
                       && !held_angle_stands(&run->held) && qm_abs(c->ref_q13.q) < c->iq_limit_q13);
 }
 
-void model_learn_step(drive_t *d, const drive_params_t *p)
+void model_learn_step(drive_run_t *run, const drive_params_t *p)
 {
-    drive_run_t *run = &d->run;
-    voltage_q12_t ri_q12 = 0;
-    if (drive_is_closed(d)) {
-        if (!model_is_taught(run)) {
-            return;
-        }
-        ri_q12 = model_ri(run, p);
-    } else if (d->state != (uint16_t)DRIVE_RAMP || !d->run.handover.at_end) {
-        return; /* nothing turns that the estimator could see */
-    } else {
-        /* flux alone */
+    if (model_is_taught(run)) {
+        adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), model_ri(run, p));
     }
-    adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), ri_q12);
+}
+
+void model_learn_flux(drive_run_t *run, const drive_params_t *p)
+{
+    adaptation_learn(&run->adaptation, &p->adaptation, estimator_emf(&run->estimator), 0);
 }
 
 /** While there is d current of the start: what R has too much then loses a loaded rotor, what it lacks does not. After drive_update_model(). */

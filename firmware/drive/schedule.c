@@ -75,13 +75,11 @@ static void limit_currents(drive_t *d, const drive_params_t *p, const drive_samp
     limits_driving(d, p);
 }
 
-/** In closed loop as limit_currents(); then what the running motor teaches. */
+/** As limit_currents(); then what the running motor teaches. */
 static void limit_and_learn(drive_t *d, const drive_params_t *p, const drive_samples_t *raw)
 {
-    if (drive_is_closed(d)) {
-        limit_currents(d, p, raw);
-    }
-    model_learn_step(d, p);
+    limit_currents(d, p, raw);
+    model_learn_step(&d->run, p);
 }
 
 /** The observer's rate, the controller's gain, the current that the samples miss. */

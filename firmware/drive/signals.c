@@ -144,7 +144,7 @@ void signals_check(drive_t *d, const drive_params_t *p)
     }
 }
 
-NOINLINE void signals_judge(drive_t *d, const drive_params_t *p)
+void signals_judge(drive_t *d, const drive_params_t *p)
 {
     drive_run_t *run = &d->run;
     signals_evidence_t *e = &run->evidence;

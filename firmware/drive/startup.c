@@ -54,7 +54,6 @@ void startup_ramp_from_here(drive_t *d, const drive_params_t *p)
     dq_t v = c->v_q14;
     held_forget(&run->held); /* the ramp's estimator must see the rotor */
     run->handover.agreed_steps = 0;
-    run->handover.at_end = 0;
     run->handover.ahead_erpm = 0;
     run->handover.offset = 0;
     run->handover.id_q13 = 0;
@@ -214,9 +213,11 @@ void handover_wait(drive_t *d, const drive_params_t *p)
         return;
     }
     most = (int16_t)(forced >> (handover_agrees(h) ? 1 : 2));
-    h->at_end = at_end;
     d->periods = (uint16_t)(at_end ? d->periods + SLOW_PERIODS : 0);
     h->agreed_steps = (uint16_t)((qm_abs(ahead) < most && (at_end || qm_abs(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
+    if (at_end || h->agreed_steps != 0u) {
+        model_learn_flux(&d->run, p);
+    }
     if (h->agreed_steps >= p->agree_steps) {
         handover_prepare(d, p, forced, seen, ahead);
         return;

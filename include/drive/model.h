@@ -35,9 +35,12 @@ voltage_q12_t model_header_ri(const drive_params_t *p, current_q13_t i_q13);
 /** R i_q in the format of the filtered back-EMF. */
 voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p);
 
-/** A step of the adaptation. Slot 10. At the end of the ramp, while the estimator is waited for, it may need a truer flux before it can
- *  lock, with flux, R and L all off; the current is nearly all d current there and says nothing of R. */
-void model_learn_step(drive_t *d, const drive_params_t *p);
+/** A step of the adaptation in closed loop. Slot 10. */
+void model_learn_step(drive_run_t *run, const drive_params_t *p);
+
+/** The same before, four times as often: what a wrong flux turns the estimator by has to be gone at the hand-over. With flux, R and L all off it may need a
+ *  truer flux before it can lock. The current is nearly all d current there and says nothing of R. */
+void model_learn_flux(drive_run_t *run, const drive_params_t *p);
 
 /** The motor's constants for a speed reference: the tables, and what the motor has shown. @param speed_erpm of the rotor: one that was
  *  asked whether it stands gets field weakening for no more than twice this, until it is at half of the reference */

@@ -28,7 +28,7 @@ typedef struct {
     SLOT( 7, trim_speed,    CLOSED,    follow_estimate,  EVERY) \
     SLOT( 8, observe_load,  EVERY,     control_speed,    CLOSED) \
     SLOT( 9, step_state,    EVERY,     follow_bus,       EVERY) \
-    SLOT(10, limit_voltage, EVERY,     limit_and_learn,  RUNNING) \
+    SLOT(10, limit_voltage, EVERY,     limit_and_learn,  CLOSED) \
     SLOT(11, follow_speed,  CLOSED,    watch_signals,    CLOSED) \
     SLOT(12, observe_load,  EVERY,     control_speed,    CLOSED) \
     SLOT(13, ask_rotor,     EVERY,     follow_bus,       EVERY) \

@@ -64,7 +64,6 @@ typedef enum {
 typedef struct {
     uint16_t phase;            /**< start_phase_t; written by handover_enter() only */
     uint16_t agreed_steps;     /**< the last ones, in which the estimator agreed with the forced speed */
-    uint16_t at_end;           /**< 1: the ramp has come to its end and waits for the estimator; the state's periods count */
     int16_t ahead_erpm;        /**< by how much the estimated speed is ahead of the forced one, in the mean */
     int16_t offset;            /**< angle that is left of the change of frame, angle counts */
     current_q13_t current_q13; /**< of the ramp, at the hand-over */

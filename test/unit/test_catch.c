@@ -422,7 +422,6 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         drive.state = (uint16_t)DRIVE_STOPPING;
         drive.command.target_erpm = (int16_t)(direction * -6000);
         drive.run.handover.agreed_steps = 99; /* of the start long ago */
-        drive.run.handover.at_end = 1;
         drive.run.handover.phase = (uint16_t)START_HAND_OVER;
         drive.run.estimator.rho_q32 = 0x12340000ul;
         drive.run.control.v_q14 = v_q14;
@@ -446,7 +445,6 @@ void test_the_end_of_a_stop_is_a_ramp_the_other_way_if_the_run_is_still_wished(v
         TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.offset);
         TEST_ASSERT_EQUAL_INT16(0, drive.run.handover.id_q13);
         TEST_ASSERT_EQUAL_UINT16(START_RAMP, drive.run.handover.phase); /* the next hand-over presets the observer anew */
-        TEST_ASSERT_EQUAL_UINT16(0, drive.run.handover.at_end);
         /* the current lies along the rotor's flux */
         TEST_ASSERT_INT16_WITHIN(2, (int16_t)estimator_next_angle(&drive.run.estimator), (int16_t)(angle_t)(drive.angle - (angle_t)(direction * 0x4000)));
     }

@@ -17,7 +17,7 @@ static void teachable(int16_t direction)
 static int16_t learns(void)
 {
     adaptation_t before = drive.run.adaptation;
-    model_learn_step(&drive, &params);
+    model_learn_step(&drive.run, &params);
     return (int16_t)(drive.run.adaptation.kfi_q31 != before.kfi_q31 || drive.run.adaptation.rs_q31 != before.rs_q31);
 }
 
@@ -100,15 +100,37 @@ void test_it_learns_every_32nd_period_of_the_closed_loop_only(void)
     }
 }
 
-void test_in_the_ramp_flux_alone_is_learnt_once_the_estimator_is_waited_for(void)
+void test_in_the_ramp_flux_alone_is_learnt_every_8th_period_while_the_estimator_agrees_or_is_waited_for(void)
 {
-    for (uint16_t waited = 0; waited < 2u; waited++) {
+    static const struct {
+        int16_t at_end, agrees;
+    } cases[] = { { 0, 0 }, { 0, 1 }, { 1, 0 }, { 1, 1 } };
+    EACH_DIRECTION(direction) {
+        EACH(n, cases) {
+            int32_t before = 0;
+            teachable(direction);
+            drive.state = (uint16_t)DRIVE_RAMP;
+            drive.forced.speed_q10 = cases[n].at_end ? params.forced.end_speed_q10 : params.forced.end_speed_q10 / 8 * 7;
+            rig_speed((int16_t)(direction * (cases[n].agrees ? handover_forced_erpm(&drive, &params) : 0)));
+            for (uint16_t part = 0; part < SLOW_PARTS; part++) {
+                rig_slow(part);
+                TEST_ASSERT_EQUAL_INT16_MESSAGE((part % 4u) == 0u && (cases[n].at_end || cases[n].agrees), drive.run.adaptation.kfi_q31 < before, golden_row(n));
+                before = drive.run.adaptation.kfi_q31;
+            }
+            TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+        }
+    }
+}
+
+void test_flux_of_the_ramp_stays_within_what_may_be_learnt(void)
+{
+    EACH_DIRECTION(sign) {
         teachable(1);
-        drive.state = (uint16_t)DRIVE_RAMP;
-        drive.run.handover.at_end = waited;
-        rig_slow(10);
-        TEST_ASSERT_EQUAL_INT16(waited, drive.run.adaptation.kfi_q31 != 0);
-        TEST_ASSERT_EQUAL_INT32(0, drive.run.adaptation.rs_q31);
+        drive.run.estimator.e_d_q28 = (int32_t)sign * 300 * 65536;
+        for (uint16_t n = 0; n < 2000u; n++) {
+            model_learn_flux(&drive.run, &params);
+        }
+        TEST_ASSERT_EQUAL_INT16((sign > 0) ? params.adaptation.kfi_least : params.adaptation.kfi_most, qm_hi(drive.run.adaptation.kfi_q31));
     }
 }
 
