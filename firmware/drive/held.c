@@ -4,7 +4,6 @@
 #include "control/tuned.h"
 #include "drive/drive.h"
 #include "drive/protection.h"
-#include "drive/speed.h"
 
 #define HELD_NOTHING ((dq_t){ 0, 0 })
 #define HELD_QUARTER 16384                         /* of a turn, angle counts */
@@ -280,7 +279,7 @@ static NOINLINE void held_watch(drive_t *d, const drive_params_t *p, dq_t emf)
         doubts = (uint16_t)((shaft->stood != 0u) ? doubts : 0u); /* it stood, and speeds up */
     }
     shaft->doubts = (uint16_t)((doubts != 0u) ? shaft->doubts + doubts : 0u);
-    if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || !speed_swings(&d->run))) {
+    if (shaft->doubts >= HELD_DOUBTS_MOST && (shaft->doubts >= HELD_DOUBTS_SWINGS || d->run.control.swing_steps <= HELD_SWINGS * SPEED_SWING_STEPS)) {
         shaft->act = (uint16_t)HELD_STOP;
     }
 }

@@ -511,12 +511,17 @@ void test_resistance_that_has_risen_rises_to_its_bound_and_not_beyond(void)
 
 void test_a_speed_that_swings_is_asked_later(void)
 {
-    at(1, FAST_ERPM, 1500, 0, 400);
-    drive.run.control.swing_steps = 3u * SPEED_SWING_STEPS + 1u;
-    steps(HELD_DOUBTS_SWINGS - 1u);
-    TEST_ASSERT_EQUAL_UINT16(HELD_NOT, shaft->phase);
-    steps(1);
-    TEST_ASSERT_EQUAL_UINT16(HELD_SETTLES, shaft->phase);
+    static const struct {
+        uint16_t swing_steps, asked;
+    } cases[] = { { 0, HELD_DOUBTS_MOST }, { 2u * SPEED_SWING_STEPS, HELD_DOUBTS_MOST }, { 2u * SPEED_SWING_STEPS + 1u, HELD_DOUBTS_SWINGS }, { 4u * SPEED_SWING_STEPS, HELD_DOUBTS_SWINGS } };
+    EACH(n, cases) {
+        at(1, FAST_ERPM, 1500, 0, 400);
+        drive.run.control.swing_steps = cases[n].swing_steps;
+        steps((uint16_t)(cases[n].asked - 1u));
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(HELD_NOT, shaft->phase, golden_row(n));
+        steps(1);
+        TEST_ASSERT_EQUAL_UINT16_MESSAGE(HELD_SETTLES, shaft->phase, golden_row(n));
+    }
 }
 
 void test_of_a_back_emf_that_falls_slowly_the_frame_is_turned_back_by_the_last_steps_alone(void)
