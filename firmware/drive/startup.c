@@ -215,7 +215,7 @@ void handover_wait(drive_t *d, const drive_params_t *p)
     most = (int16_t)(forced >> (handover_agrees(h) ? 1 : 2));
     d->periods = (uint16_t)(at_end ? d->periods + SLOW_PERIODS : 0);
     h->agreed_steps = (uint16_t)((qm_abs(ahead) < most && (at_end || qm_abs(h->ahead_erpm) < most >> 1)) ? h->agreed_steps + 1u : 0u);
-    if (at_end || h->agreed_steps != 0u) {
+    if ((at_end || h->agreed_steps != 0u) && qm_beyond(estimator_emf(&d->run.estimator).d, p->adaptation.emf_least_q12)) {
         model_learn_flux(&d->run, p);
     }
     if (h->agreed_steps >= p->agree_steps) {

@@ -38,8 +38,8 @@ voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p);
 /** A step of the adaptation in closed loop. Slot 10. */
 void model_learn_step(drive_run_t *run, const drive_params_t *p);
 
-/** The same before, four times as often: what a wrong flux turns the estimator by has to be gone at the hand-over. With flux, R and L all off it may need a
- *  truer flux before it can lock. The current is nearly all d current there and says nothing of R. */
+/** The same before, four times as often, while Ed is beyond what dead time leaves: a wrong flux turns the estimator by that, which has to be gone at the
+ *  hand-over, or keeps it from locking. The current is nearly all d current there and says nothing of R. */
 void model_learn_flux(drive_run_t *run, const drive_params_t *p);
 
 /** The motor's constants for a speed reference: the tables, and what the motor has shown. @param speed_erpm of the rotor: one that was
