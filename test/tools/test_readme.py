@@ -115,9 +115,9 @@ def test_every_motor_has_its_line_of_starts_in_the_box_and_drawn_and_the_plain_o
 @pytest.fixture
 def long_draws(result, tmp_path):
     """What a campaign and a soak leave, with numbers changed."""
-    def write(cases: int = 1990, hours: float = 24.2, wrong: int = 2) -> None:
+    def write(cases: int = 1990, hours: float = 24.2, wrong: int = 0) -> None:
         for folder, data in (("campaign", {"classes": {"no effect": cases, "ridden through": 10, "wrong and silent": 0}}),
-                             ("soak", {"motor_hours": hours, "wrong": wrong, "held": 40, "wrong_held": 2})):
+                             ("soak", {"motor_hours": hours, "wrong": wrong, "held": 40, "wrong_held": wrong})):
             (tmp_path / "build" / folder / "seed-1").mkdir(parents=True)
             (tmp_path / "build" / folder / "seed-1/summary.json").write_text(json.dumps(data))
     return write
@@ -125,13 +125,13 @@ def long_draws(result, tmp_path):
 
 def test_the_long_draws_are_told_with_their_shares(long_draws):
     long_draws()
-    assert [figures.campaign(), figures.soak()] == ["1990 no effect; 10 ridden through", "0 wrong in 24.2 h but 2 of 40 segments with a held shaft"]
+    assert [figures.campaign(), figures.soak()] == ["1990 no effect; 10 ridden through", "0 wrong in 24.2 h; in 40 segments the shaft is held"]
 
 
-@pytest.mark.parametrize("less, told", [({"cases": 1989}, figures.campaign), ({"hours": 23.9}, figures.soak), ({"wrong": 3}, figures.soak)])
+@pytest.mark.parametrize("less, told", [({"cases": 1989}, figures.campaign), ({"hours": 23.9}, figures.soak), ({"wrong": 1}, figures.soak)])
 def test_less_than_the_readme_promises_is_refused(long_draws, less, told):
     long_draws(**less)
-    with pytest.raises(UserError, match=r"^(less than the README promises|a segment without a held shaft ends wrong), make (campaign|soak): "):
+    with pytest.raises(UserError, match=r"^(less than the README promises|1 segments end wrong), make (campaign|soak): "):
         told()
 
 

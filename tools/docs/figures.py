@@ -213,9 +213,9 @@ def soak() -> str:
     hours = result("seed-1", "soak", "make soak")
     if hours["motor_hours"] < 24.0:
         raise UserError("less than the README promises", "make soak", "24 motor hours are told")
-    if hours["wrong"] != hours["wrong_held"]:
-        raise UserError("a segment without a held shaft ends wrong", "make soak", "the README promises none")
-    return f"0 wrong in {hours['motor_hours']:.1f} h but {hours['wrong_held']} of {hours['held']} segments with a held shaft"
+    if hours["wrong"]:
+        raise UserError(f"{hours['wrong']} segments end wrong", "make soak", "the README promises none")
+    return f"0 wrong in {hours['motor_hours']:.1f} h; in {hours['held']} segments the shaft is held"
 
 
 def closed_loop() -> str:
@@ -284,7 +284,7 @@ GUARANTEES: list[tuple[str, tuple[str, ...], Callable[[], str], str]] = [
     ("controlled stop from 5500 rpm, bus below 30 V", ("stop_from_top",), stop, "make run SCENARIO=stop_from_top"),
     ("a blocked shaft ends in a named fault within 2 s", ("fault_stall",), blocked, "make run SCENARIO=fault_stall"),
     ("2000 injected faults: each is ridden through or ends in a named stop", ("campaign",), campaign, "make campaign"),
-    ("24 motor hours of random use on all motors: no fault, no drift, no lost lock, unless a hand holds the shaft", ("soak",), soak, "make soak"),
+    ("24 motor hours of random use on all motors: no fault, no drift, no lost lock, held shafts too", ("soak",), soak, "make soak"),
     ("virtual board: 20 times real time on one core", ("demo",), real_time, "make run"),
 ]
 
