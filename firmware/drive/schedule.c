@@ -152,7 +152,6 @@ static void check_model(drive_t *d, const drive_params_t *p, const drive_samples
 /* ---- which half comes when: the only place that knows of the period's length ---- */
 
 #define IN_EVERY(d) 1u
-#define IN_RUNNING(d) drive_is_running(d)
 #define IN_CLOSED(d) drive_is_closed(d)
 
 /* Deferred duties: a call is half a slot. */

@@ -95,7 +95,6 @@ static void any_drive(uint16_t state)
     drive.run.align.is_limited = any_u(0, 1);
     drive.run.handover.agreed_steps = ANYU16();
     drive.run.handover.phase = any_u(START_ALIGN, START_DONE);
-    drive.run.handover.at_end = any_u(0, 1);
     drive.run.handover.offset = ANY16();
     drive.run.handover.id_q13 = any((int16_t)-current_max, current_max);
 #ifdef TUNING
