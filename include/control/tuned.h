@@ -125,7 +125,7 @@
 #define HELD_DOUBTS_MOST 5u   /* [1] steps of 16 periods, below half the reference, that look like a held rotor: then the angle stands | loadsteps */
 #define HELD_DOUBTS_FAR 3u    /* [1] below an eighth of the reference a step counts as many | held */
 #define HELD_DOUBTS_SWINGS 40u /* [1] and where the speed swings, for then it is so slow in each turn | pulse */
-#define HELD_SWINGS 2u /* [1] from the third to one side or the other on: a rotor that is held from rest has one | pulse */
+#define HELD_SWINGS 2u        /* [1] swings to one side or the other in a row that are still none: a shaft that is held at an even speed makes one | pulse */
 #define HELD_LAG_SHIFT 2      /* [shift] of what the back-EMF's filter is behind 1/4 is forgotten a step, before a rotor is doubted | held */
 #define HELD_FAR_LEAD 5461    /* [2^-16 turn] 30 degrees: a frame that is turned back by more changes the currents | held */
 #define HELD_FAR_SHIFT 3         /* [shift] and 1/8 of the largest current as d current, which goes as the angle stops | soak */

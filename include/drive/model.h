@@ -35,11 +35,11 @@ voltage_q12_t model_header_ri(const drive_params_t *p, current_q13_t i_q13);
 /** R i_q in the format of the filtered back-EMF. */
 voltage_q12_t model_ri(const drive_run_t *run, const drive_params_t *p);
 
-/** A step of the adaptation in closed loop. Slot 10. */
+/** A step of the adaptation in closed loop: 1/Kphi and R follow Ed. Slot 10. */
 void model_learn_step(drive_run_t *run, const drive_params_t *p);
 
-/** The same before, four times as often, while Ed is beyond what dead time leaves: a wrong flux turns the estimator by that, which has to be gone at the
- *  hand-over, or keeps it from locking. The current is nearly all d current there and says nothing of R. */
+/** In RAMP 1/Kphi alone follows Ed, four times as often (handover_wait): a wrong one turns the estimator's frame, which has to be right at the hand-over, or keeps it
+ *  from locking. The current is nearly all d current there and says nothing of R. */
 void model_learn_flux(drive_run_t *run, const drive_params_t *p);
 
 /** The motor's constants for a speed reference: the tables, and what the motor has shown. @param speed_erpm of the rotor: one that was

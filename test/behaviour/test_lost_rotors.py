@@ -4,7 +4,7 @@ import argparse
 
 import pytest
 
-from tools.bench import build, command_common, held_sweep, loadsteps
+from tools.bench import build, command_common, held_sweep, loadsteps, start_sweep
 from tools.bench.held_sweep import Case
 from tools.common import board_file, motor_file, paths
 from tuning import design, header
@@ -44,3 +44,10 @@ def test_a_brake_that_takes_300_rpm_a_millisecond_drives_no_current_over_its_lim
     held, item = sweep(held_sweep.Held, held_sweep, DMA0204, tmp_path), Case(2100.0, 0.0, 1.0, 0.08, 0.0, brake_nm=0.546)
     row, = held.run([item], DMA0204)
     assert row["fault"] is None and row["backwards_rpm"] == 0.0 and row["back_s"] < 0.2
+
+
+def test_a_salient_motor_with_less_flux_and_inductance_than_its_header_says_starts_under_load(tmp_path):
+    starts = sweep(start_sweep.Starts, start_sweep, IPM, tmp_path)
+    items = [item for item in starts.table.box(full=True) if (item.L, item.Kphi) == (0.75, 0.8)]
+    rows = starts.run(items, IPM)
+    assert len(rows) == 40 and [f"{outcome.row}: {outcome.got}" for item, row in zip(items, rows) for outcome in starts.check(item, row) if not outcome.ok] == []
